@@ -89,7 +89,8 @@ impl EarlierFailures {
             let work = manifest.scenarios.iter().position(|scenario| scenario.name == record.scenario)?;
             Some(SampleKey { work, sample: record.sample })
         };
-        let kept = ahead::read(&waiting, place).map_err(|source| FolderError::Read { path: waiting.clone(), source })?;
+        let kept =
+            ahead::read(&waiting, place).map_err(|source| FolderError::Read { path: waiting.clone(), source })?;
         kept.ahead.waiting().for_each(push);
         for numbers in samples.values_mut() {
             numbers.sort_unstable();

@@ -120,7 +120,8 @@ fn a_search_beyond_the_samples_of_two_campaigns_finds_a_regression_and_writes_it
     let run = |controller: &str| stdout(&closecall(["run", case.to_str().unwrap(), "--controller", controller]), 0);
     assert!(run("gap-1.6").contains("COLLISION") && !run("acc").contains("COLLISION"), "{text}");
     // It is the search of a campaign with both arms.
-    let words = "campaign low-thw-overtake --arms acc,gap-1.6 --sensors object --design search --event induced --seed 7";
+    let words =
+        "campaign low-thw-overtake --arms acc,gap-1.6 --sensors object --design search --event induced --seed 7";
     stdout(&closecall(words.split_whitespace().chain(["--out", same.to_str().unwrap()])), 1);
     let journal = |folder: &Path| std::fs::read(folder.join("rare-journal.jsonl")).unwrap();
     assert!(journal(&out) == journal(&same));

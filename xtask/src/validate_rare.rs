@@ -171,8 +171,9 @@ fn of_scenario(method: Method, repetitions: u64) -> Result<Total, Box<dyn std::e
         let sampling = Sampling { seed, design: Design::Random, samples: 1 };
         let (file, arms) = (file.clone(), arms.clone());
         let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::off(), retry_crashed: 0 });
-        let report =
-            plan.run((0, &work), None, &StopFlag::default(), &mut || {}).map_err(|error: RareError| error.to_string())?;
+        let report = plan
+            .run((0, &work), None, &StopFlag::default(), &mut || {})
+            .map_err(|error: RareError| error.to_string())?;
         let interval = report.main().and_then(|estimate| Some((estimate.value, estimate.interval_95?)));
         total.push(OF_FIXTURE, report.runs, interval);
     }

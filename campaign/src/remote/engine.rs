@@ -76,10 +76,7 @@ pub fn connect(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<
 ///
 /// # Errors
 /// As [`connect`].
-pub fn connect_points(
-    address: Option<&str>,
-    manifest: &Manifest,
-) -> Result<Option<Arc<dyn PointRunner>>, RemoteError> {
+pub fn connect_points(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<dyn PointRunner>>, RemoteError> {
     Ok(workers(address, manifest)?.map(|workers| Arc::new(workers) as Arc<dyn PointRunner>))
 }
 
