@@ -187,12 +187,50 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
     ]
 }
 
+/// Attributes that no version of the standard has, or not with this value: a text, its replacement,
+/// and the words that the message must have.
+fn faults_of_attributes() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
+    vec![
+        ("<Event name=", "<Event colour=\"red\" name=", &["`Event`", "`colour` is no attribute", "name, priority"]),
+        ("<Init>", "<Init speed=\"3\">", &["`Init`", "`speed` is no attribute of it, which can have none"]),
+        ("<Init>", "<Init/><Init>", &["`Init`", "`Storyboard` has one already"]),
+        ("<Storyboard>", "<Storyboard>now", &["`Storyboard`", "`now`", "no text is allowed"]),
+        ("priority=\"parallel\"", "priority=\"foo\"", &["`Event`", "`foo`", "overwrite, override, parallel, skip"]),
+        ("maximumExecutionCount=\"1\"", "maximumExecutionCount=\"-1\"", &["`ManeuverGroup`", "`-1`", "at least 0"]),
+        ("maximumExecutionCount=\"1\"", "maximumExecutionCount=\"2\"", &["`ManeuverGroup`", "`2`", "must be 1"]),
+        ("\"sinusoidal\"", "\"wavy\"", &["`LaneChangeActionDynamics`", "`wavy`", "cubic, linear, sinusoidal, step"]),
+        ("dynamicsDimension=\"time\"", "dynamicsDimension=\"hours\"", &["`hours`", "distance, rate, time"]),
+        ("freespace=\"false\"", "freespace=\"maybe\"", &["`TimeHeadwayCondition`", "`maybe`", "true, false"]),
+        ("freespace=", "coordinateSystem=\"moon\" freespace=", &["`coordinateSystem` is `moon`", "entity, lane, road"]),
+        ("freespace=", "coordinateSystem=\"world\" freespace=", &["`world`", "not read, only entity, lane, road"]),
+        ("freespace=", "relativeDistanceType=\"far\" freespace=", &["`relativeDistanceType` is `far`", "lateral"]),
+        ("freespace=", "relativeDistanceType=\"lateral\" freespace=", &["`lateral`", "only longitudinal"]),
+        ("freespace=", "routingAlgorithm=\"widest\" freespace=", &["`routingAlgorithm` is `widest`", "shortest"]),
+        ("value=\"$Headway\"", "value=\"-1\"", &["`TimeHeadwayCondition`", "`value` is `-1`", "at least 0"]),
+        ("delay=\"0.5\"", "delay=\"-5\"", &["`Condition`", "`delay` is `-5`", "at least 0"]),
+        ("conditionEdge=\"none\"", "conditionEdge=\"$Gap\"", &["`Condition`", "`60`", "falling, none, rising"]),
+        ("triggeringEntitiesRule=\"any\"", "triggeringEntitiesRule=\"some\"", &["TriggeringEntities", "all, any"]),
+        ("selectTriggeringEntities=\"false\"", "selectTriggeringEntities=\"true\"", &["`Actors`", "not read"]),
+        ("storyboardElementType=\"event\"", "storyboardElementType=\"act\"", &["there is no act `cut-in`"]),
+        ("storyboardElementType=\"event\"", "storyboardElementType=\"deed\"", &["`deed`", "act, action, event"]),
+        ("state=\"completeState\"", "state=\"done\"", &["`state` is `done`", "completeState, endTransition"]),
+        ("speedTargetValueType=\"delta\"", "speedTargetValueType=\"sum\"", &["RelativeTargetSpeed", "delta, factor"]),
+        ("continuous=\"false\"", "continuous=\"no\"", &["`RelativeTargetSpeed`", "`continuous` is `no`"]),
+        ("laneId=\"-1\"", "laneId=\"-1.5\"", &["`LanePosition`", "`laneId` is `-1.5`", "whole number"]),
+        ("vehicleCategory=\"truck\"", "vehicleCategory=\"lorry\"", &[":26:", "`lorry`", "bicycle, bus, car"]),
+        ("mass=\"1600\"", "mass=\"-1600\"", &["`Vehicle`", "`mass` is `-1600`", "at least 0"]),
+        ("parameterType=\"double\"", "parameterType=\"float\"", &["`ParameterDeclaration`", "`float`", "double"]),
+        ("value=\"60\"", "value=\"wide\"", &["`ParameterDeclaration`", "the double `Gap`", "`wide`"]),
+        ("name=\"Gap\"", "name=\"Headway\"", &["`ParameterDeclaration`", "`Headway` is declared before"]),
+    ]
+}
+
 #[test]
 fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
     let mut count = 0;
-    for (right, wrong, words) in faults() {
+    for (right, wrong, words) in faults().into_iter().chain(faults_of_attributes()) {
         assert!(SCENARIO.contains(right), "{right}");
         let path = written(folder.path(), &SCENARIO.replacen(right, wrong, 1), ROAD);
         let refused = imported(&path, &output, &[]);
@@ -257,6 +295,52 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         assert!(said.contains(word), "{wrong}: {word}: {said}");
         assert!(!output.exists(), "{wrong}");
     }
+}
+
+#[test]
+fn an_action_ends_with_its_event_so_that_a_condition_sees_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let by_action = SCENARIO.replacen(
+        "storyboardElementType=\"event\" storyboardElementRef=\"cut-in\"",
+        "storyboardElementType=\"action\" storyboardElementRef=\"cut-in-action\"",
+        1,
+    );
+    assert!(by_action != SCENARIO);
+    let said = stdout(&imported(&written(folder.path(), &by_action, ROAD), &output, &[]), 0);
+    assert!((time_of(&said, "brake begins") - 7.5).abs() <= 0.021, "{said}");
+}
+
+#[test]
+fn thousands_of_parameters_do_not_slow_the_storyboard() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let declarations = |letter: char| {
+        (1..8_000)
+            .map(|number| {
+                let before = number - 1;
+                format!(
+                    "<ParameterDeclaration name=\"{letter}{number}\" parameterType=\"double\" \
+                     value=\"${{${letter}{before} + 0}}\"/>\n"
+                )
+            })
+            .collect::<String>()
+    };
+    let first = |letter: char, value: &str| {
+        format!("<ParameterDeclaration name=\"{letter}0\" parameterType=\"double\" value=\"{value}\"/>")
+    };
+    let outer = format!("<ParameterDeclarations>{}{}", first('p', "1.0"), declarations('p'));
+    let inner = format!(
+        "<Story name=\"story\"><ParameterDeclarations>{}{}</ParameterDeclarations>",
+        first('q', "$p7999"),
+        declarations('q')
+    );
+    let many = SCENARIO
+        .replacen("<ParameterDeclarations>", &outer, 1)
+        .replacen("<Story name=\"story\">", &inner, 1)
+        .replacen("value=\"$Headway\"", "value=\"$q7999\"", 1);
+    let said = stdout(&imported(&written(folder.path(), &many, ROAD), &output, &[]), 0);
+    assert!((time_of(&said, "cut-in begins") - 3.0).abs() <= 0.011, "{said}");
 }
 
 #[test]

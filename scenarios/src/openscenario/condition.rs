@@ -1,7 +1,8 @@
 //! Triggers and conditions.
 
 use super::dom::{ImportError, Node};
-use super::storyboard::{ElementState, Storyboard};
+use super::reader::is_true;
+use super::storyboard::{ElementState, Storyboard, StoryboardElement};
 use super::world::Vehicle;
 
 /// What a condition remembers from step to step: its last value, and when it became true.
@@ -79,25 +80,29 @@ impl Storyboard<'_> {
         match node.name.as_str() {
             "SimulationTimeCondition" => self.compare(node, self.time_s),
             "ParameterCondition" => {
-                let name = reader.text(node, "parameterRef")?;
-                let value = reader.values.get(name.trim_start_matches('$')).cloned().unwrap_or_default();
-                match value.trim().parse() {
-                    Ok(number) => self.compare(node, number),
-                    Err(_) => Ok(value == reader.text(node, "value")?),
+                // The check of the document has put the value in place of the name.
+                let value = reader.text(node, "parameterRef")?;
+                let (rule, limit) = (reader.text(node, "rule")?, reader.text(node, "value")?);
+                match (value.trim().parse(), rule.as_str()) {
+                    (Ok(number), _) => self.compare(node, number),
+                    (Err(_), "equalTo") => Ok(value == limit),
+                    (Err(_), "notEqualTo") => Ok(value != limit),
+                    (Err(_), _) => {
+                        let message = format!("`rule` is `{rule}`, and `{value}` is no number: it has no order");
+                        Err(reader.error(node, message))
+                    }
                 }
             }
             "StoryboardElementStateCondition" => {
-                let name = reader.text(node, "storyboardElementRef")?;
+                let stated = reader.text(node, "storyboardElementRef")?;
                 let state = reader.text(node, "state")?;
                 // A path such as `story::act` ends with the element's name.
-                let name = name.rsplit("::").next().unwrap_or_default();
-                let Some(element) = self.states.get(name) else {
-                    return if self.names.contains(name) {
-                        Ok(state == "standbyState")
-                    } else {
-                        Err(reader.error(node, format!("there is no storyboard element `{name}`")))
-                    };
-                };
+                let name = stated.rsplit("::").next().unwrap_or_default();
+                let kind = reader.text(node, "storyboardElementType")?;
+                if !self.names.contains(&StoryboardElement { kind: kind.clone(), name: name.to_owned() }) {
+                    return Err(reader.error(node, format!("there is no {kind} `{name}` in the storyboard")));
+                }
+                let Some(element) = self.states.get(name) else { return Ok(state == "standbyState") };
                 let ElementState { started_s, ended_s } = *element;
                 let has_started = started_s <= self.time_s;
                 match state.as_str() {
@@ -114,13 +119,10 @@ impl Storyboard<'_> {
 
     fn by_entity(&self, vehicle: &Vehicle, node: &Node) -> Result<bool, ImportError> {
         let reader = &self.reader;
-        if let Some(kind) = reader.optional(node, "relativeDistanceType")?.filter(|kind| kind != "longitudinal") {
-            return Err(reader.error(node, format!("`relativeDistanceType` is `{kind}`: only `longitudinal` is read")));
-        }
         match node.name.as_str() {
             "TimeHeadwayCondition" => {
                 let other = self.vehicle(node, "entityRef")?;
-                let distance_m = vehicle.distance_m(other, reader.is_true(node, "freespace")?);
+                let distance_m = vehicle.distance_m(other, is_true(node, "freespace"));
                 // A vehicle behind, or one that stands, has no headway.
                 Ok(distance_m >= 0.0
                     && vehicle.speed_mps > 0.0
@@ -133,13 +135,13 @@ impl Storyboard<'_> {
                     return Err(reader.error(entity, "the target must be an `EntityRef`"));
                 }
                 let other = self.vehicle(entity, "entityRef")?;
-                let distance_m = vehicle.distance_m(other, reader.is_true(node, "freespace")?);
+                let distance_m = vehicle.distance_m(other, is_true(node, "freespace"));
                 let closing_mps = (vehicle.speed_mps - other.speed_mps) * distance_m.signum();
                 Ok(closing_mps > 0.0 && self.compare(node, distance_m.abs() / closing_mps)?)
             }
             "RelativeDistanceCondition" => {
                 let other = self.vehicle(node, "entityRef")?;
-                self.compare(node, vehicle.distance_m(other, reader.is_true(node, "freespace")?).abs())
+                self.compare(node, vehicle.distance_m(other, is_true(node, "freespace")).abs())
             }
             "SpeedCondition" => self.compare(node, vehicle.speed_mps),
             "AccelerationCondition" => self.compare(node, vehicle.acceleration_mps2.abs()),

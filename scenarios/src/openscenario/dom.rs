@@ -24,6 +24,30 @@ pub struct ImportError {
     pub message: String,
 }
 
+/// An attribute.
+#[derive(Clone, Debug)]
+pub(super) struct Attribute {
+    /// The name with its prefix, if it has one.
+    pub(super) key: String,
+    pub(super) value: String,
+}
+
+impl Attribute {
+    /// Returns the name without its prefix.
+    fn local_name(&self) -> &str {
+        self.key.split_once(':').map_or(self.key.as_str(), |(_, name)| name)
+    }
+
+    /// Returns true for an attribute of XML or of its schemas, which is none of the format.
+    pub(super) fn is_of_xml(&self) -> bool {
+        let prefix = self.key.split_once(':').map_or(self.key.as_str(), |(prefix, _)| prefix);
+        match prefix.len() == self.key.len() {
+            true => prefix == "xmlns",
+            false => matches!(prefix, "xml" | "xmlns" | "xsi"),
+        }
+    }
+}
+
 /// An element with its attributes and children.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Node {
@@ -31,15 +55,15 @@ pub(super) struct Node {
     pub(super) line: usize,
     /// Number of the element in the document.
     pub(super) id: usize,
-    attributes: Vec<(String, String)>,
+    pub(super) attributes: Vec<Attribute>,
     pub(super) children: Vec<Node>,
     pub(super) text: String,
 }
 
 impl Node {
-    /// Returns an attribute as it stands in the file.
+    /// Returns an attribute as it stands in the document.
     pub(super) fn raw(&self, name: &str) -> Option<&str> {
-        self.attributes.iter().find(|(attribute, _)| attribute == name).map(|(_, value)| value.as_str())
+        self.attributes.iter().find(|attribute| attribute.key == name).map(|attribute| attribute.value.as_str())
     }
 
     /// Returns the first child of this name.
@@ -73,9 +97,9 @@ impl Node {
         add(&self.name);
         add(self.text.trim());
         add(&self.attributes.len().to_string());
-        for (name, value) in &self.attributes {
-            add(name);
-            add(value);
+        for attribute in &self.attributes {
+            add(attribute.local_name());
+            add(&attribute.value);
         }
         add(&self.children.len().to_string());
         self.children.iter().for_each(|child| child.add_to(hasher));
@@ -171,13 +195,13 @@ fn node(start: &BytesStart<'_>, line: usize) -> Result<Node, String> {
     let mut attributes = Vec::new();
     for attribute in start.attributes() {
         let attribute = attribute.map_err(|error| format!("`{name}`: {error}"))?;
-        let key = String::from_utf8_lossy(attribute.key.local_name().as_ref()).into_owned();
+        let key = String::from_utf8_lossy(attribute.key.as_ref()).into_owned();
         let raw = String::from_utf8_lossy(&attribute.value).into_owned();
         let value = quick_xml::escape::unescape(&raw).map_err(|error| format!("`{name}`: `{key}`: {error}"))?;
         if let Some(character) = value.chars().find(|character| is_forbidden(*character)) {
             return Err(format!("`{name}`: `{key}`: {}", forbidden(character)));
         }
-        attributes.push((key, value.into_owned()));
+        attributes.push(Attribute { key, value: value.into_owned() });
     }
     Ok(Node { name, line, attributes, ..Node::default() })
 }

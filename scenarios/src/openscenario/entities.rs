@@ -1,24 +1,35 @@
 //! The vehicles of a scenario, from the file itself or from a catalogue.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::input;
 
 use super::dom::{ImportError, Node, parse};
+use super::formula::no_parameter;
 use super::reader::Reader;
+use super::structure::{self, Given};
 use super::world::Vehicle;
+
+/// The entities of a scenario.
+#[derive(Default)]
+pub(super) struct Entities {
+    pub(super) vehicles: Vec<Vehicle>,
+    /// The names of the vehicles that have a controller.
+    pub(super) controlled: Vec<String>,
+    /// The parts of the catalogues that are left out.
+    pub(super) notes: Vec<String>,
+}
 
 /// Reads all entities.
 ///
 /// # Errors
 /// [`ImportError`] at an entity that is no vehicle, or that no catalogue has.
-pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<String>), ImportError> {
-    let entities = reader.child(root, &["Entities"])?;
-    let (mut vehicles, mut controlled) = (Vec::<Vehicle>::new(), Vec::new());
+pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError> {
+    let mut entities = Entities::default();
     let (mut catalogs, mut names) = (Catalogs::default(), BTreeMap::new());
-    for entity in &entities.children {
+    for entity in &reader.child(root, &["Entities"])?.children {
         if entity.name != "ScenarioObject" {
             return Err(reader.error(entity, "only `ScenarioObject` is read"));
         }
@@ -32,7 +43,7 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<St
             match child.name.as_str() {
                 "Vehicle" => vehicle = Some(of_element(reader, child)?),
                 "CatalogReference" => vehicle = Some(of_catalog(reader, (root, &mut catalogs), child)?),
-                "ObjectController" => controlled.push(name.clone()),
+                "ObjectController" => entities.controlled.push(name.clone()),
                 _ => {
                     return Err(reader
                         .error(child, format!("`{name}` is no vehicle: a scenario has cars, trucks and motorcycles")));
@@ -40,9 +51,10 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<(Vec<Vehicle>, Vec<St
             }
         }
         let Some(vehicle) = vehicle else { return Err(reader.error(entity, format!("`{name}` has no vehicle"))) };
-        vehicles.push(Vehicle { name, line: entity.line, ..vehicle });
+        entities.vehicles.push(Vehicle { name, line: entity.line, ..vehicle });
     }
-    Ok((vehicles, controlled))
+    entities.notes = catalogs.notes;
+    Ok(entities)
 }
 
 /// The catalogues of a scenario, each read once.
@@ -51,6 +63,8 @@ struct Catalogs {
     /// The files of a folder, in alphabetical order.
     folders: BTreeMap<PathBuf, Vec<PathBuf>>,
     documents: BTreeMap<PathBuf, Node>,
+    /// The parts of the entries that are left out.
+    notes: Vec<String>,
 }
 
 impl Catalogs {
@@ -107,10 +121,11 @@ fn of_catalog(
                         format!("`{entry}` is a `{}`: a scenario has cars, trucks and motorcycles", node.name);
                     return Err(reader.error(reference, message));
                 }
-                return of_element(
-                    &with_declarations(&Reader { path, ..reader.clone() }, node, reference, reader)?,
-                    node,
-                );
+                let mut entry = node.clone();
+                let given = given(reader, reference, &entry)?;
+                let notes = structure::check(&path, &mut entry, &given)?;
+                catalogs.notes.extend(notes.iter().map(|note| format!("{}, {note}", path.display())));
+                return of_element(&Reader { path }, &entry);
             }
         }
     }
@@ -119,22 +134,21 @@ fn of_catalog(
     Err(reader.error(reference, format!("no entry `{entry}` in the catalogue `{catalog}` ({places})")))
 }
 
-/// Returns the reader of an entry with its parameters. The reference gives their values, or else
-/// the entry.
-fn with_declarations(entry: &Reader, node: &Node, reference: &Node, outer: &Reader) -> Result<Reader, ImportError> {
-    let mut inner = entry.clone();
-    inner.values.clear();
-    for declaration in node.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
-    {
-        let value = entry.text(declaration, "value")?;
-        inner.values.insert(entry.text(declaration, "name")?, value);
-    }
+/// Returns the values that a reference gives to the parameters of an entry.
+fn given(reader: &Reader, reference: &Node, entry: &Node) -> Result<Given, ImportError> {
+    let lists = entry.all("ParameterDeclarations").flat_map(|list| list.all("ParameterDeclaration"));
+    let names: BTreeSet<&str> = lists.filter_map(|declaration| declaration.raw("name")).collect();
+    let mut given = Given::new();
     for assignment in
         reference.child("ParameterAssignments").into_iter().flat_map(|list| list.all("ParameterAssignment"))
     {
-        inner.values.insert(outer.text(assignment, "parameterRef")?, outer.text(assignment, "value")?);
+        let name = reader.text(assignment, "parameterRef")?;
+        if !names.contains(name.as_str()) {
+            return Err(reader.error(assignment, no_parameter(&name, &names)));
+        }
+        given.insert(name, reader.text(assignment, "value")?);
     }
-    Ok(inner)
+    Ok(given)
 }
 
 fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {

@@ -1,17 +1,63 @@
 //! Expressions of OpenSCENARIO: `$name`, and `${…}` with `+ - * / %`, parentheses and functions.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::maths;
 
-/// The values of parameters, by their names.
-pub(super) type Values = BTreeMap<String, String>;
+/// The values of the parameters that an element can use: those that it declares, and those of the
+/// elements around it. An inner value hides an outer one of the same name.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Values<'a> {
+    inner: BTreeMap<String, String>,
+    outer: Option<&'a Values<'a>>,
+}
 
+impl<'a> Values<'a> {
+    /// Creates the values of an element inside another.
+    pub(super) const fn within(outer: &'a Values<'a>) -> Self {
+        Self { inner: BTreeMap::new(), outer: Some(outer) }
+    }
+
+    /// Sets a value, and returns the former one of the same element.
+    pub(super) fn insert(&mut self, name: String, value: String) -> Option<String> {
+        self.inner.insert(name, value)
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<&str> {
+        let value = self.inner.get(name).map(String::as_str);
+        value.or_else(|| self.outer.and_then(|outer| outer.get(name)))
+    }
+
+    /// Returns the message that there is no parameter of this name, with the names that there are.
+    pub(super) fn unknown(&self, name: &str) -> String {
+        let mut names: BTreeSet<&str> = BTreeSet::new();
+        let mut values = Some(self);
+        while let Some(Values { inner, outer }) = values {
+            names.extend(inner.keys().map(String::as_str));
+            values = *outer;
+        }
+        no_parameter(name, &names)
+    }
+}
+
+/// Returns the message that there is no parameter of this name, with the names that there are.
+pub(super) fn no_parameter(name: &str, names: &BTreeSet<&str>) -> String {
+    let mut list: Vec<&str> = names.iter().copied().take(MOST_NAMES).collect();
+    if list.is_empty() {
+        list.push("none");
+    }
+    let more = names.len().saturating_sub(MOST_NAMES);
+    let more = if more > 0 { format!(" and {more} others") } else { String::new() };
+    format!("there is no parameter `{name}`, only {}{more}", list.join(", "))
+}
+
+/// Number of names that a message lists.
+const MOST_NAMES: usize = 30;
 /// Deepest nesting of parentheses and signs.
 const MOST_DEPTH: usize = 100;
 
 /// Returns the text with its parameter replaced or its expression computed.
-pub(super) fn resolve(text: &str, values: &Values) -> Result<String, String> {
+pub(super) fn resolve(text: &str, values: &Values<'_>) -> Result<String, String> {
     let text = text.trim();
     if let Some(inner) = text.strip_prefix("${").and_then(|rest| rest.strip_suffix('}')) {
         let mut parser = Parser { rest: inner, values, depth: 0 };
@@ -23,22 +69,14 @@ pub(super) fn resolve(text: &str, values: &Values) -> Result<String, String> {
         };
     }
     match text.strip_prefix('$') {
-        Some(name) => values.get(name).cloned().ok_or_else(|| unknown(name, values)),
+        Some(name) => values.get(name).map(str::to_owned).ok_or_else(|| values.unknown(name)),
         None => Ok(text.to_owned()),
     }
 }
 
-fn unknown(name: &str, values: &Values) -> String {
-    let names: Vec<_> = values.keys().map(String::as_str).collect();
-    format!(
-        "there is no parameter `{name}`, only {}",
-        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
-    )
-}
-
 struct Parser<'a> {
     rest: &'a str,
-    values: &'a Values,
+    values: &'a Values<'a>,
     depth: usize,
 }
 
@@ -98,7 +136,7 @@ impl Parser<'_> {
         }
         if self.takes('$') {
             let name = self.word();
-            let text = self.values.get(&name).ok_or_else(|| unknown(&name, self.values))?;
+            let text = self.values.get(&name).ok_or_else(|| self.values.unknown(&name))?;
             return text.trim().parse().map_err(|_| format!("the parameter `{name}` is `{text}`, and no number"));
         }
         let word = self.word();
@@ -148,7 +186,11 @@ mod tests {
 
     #[test]
     fn expressions_have_the_precedence_of_arithmetic() {
-        let values = Values::from([("v".to_owned(), "-20.0".to_owned()), ("name".to_owned(), "car".to_owned())]);
+        let mut outer = Values::default();
+        outer.insert("v".to_owned(), "20.0".to_owned());
+        outer.insert("name".to_owned(), "car".to_owned());
+        let mut values = Values::within(&outer);
+        values.insert("v".to_owned(), "-20.0".to_owned());
         let number = |text| resolve(text, &values).unwrap().parse::<f64>().unwrap();
         assert_eq!(number("${30 + (-10.0 * ($v / 3.6))}"), 30.0 + 200.0 / 3.6);
         assert_eq!(number("${-$v * 2 - 1e-1}"), 39.9);
@@ -160,5 +202,16 @@ mod tests {
         }
         let deep = format!("${{{}1{}}}", "(".repeat(5_000), ")".repeat(5_000));
         assert!(resolve(&deep, &values).unwrap_err().contains("levels"));
+    }
+
+    #[test]
+    fn a_message_lists_some_of_many_parameters() {
+        let mut values = Values::default();
+        assert_eq!(values.unknown("a"), "there is no parameter `a`, only none");
+        for number in 0..100 {
+            values.insert(format!("p{number:02}"), String::new());
+        }
+        let message = values.unknown("a");
+        assert!(message.ends_with("p28, p29 and 70 others"), "{message}");
     }
 }

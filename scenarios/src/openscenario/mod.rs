@@ -16,10 +16,12 @@ mod entities;
 mod formula;
 mod reader;
 mod road;
+mod standard;
 mod storyboard;
 mod structure;
 mod world;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -29,7 +31,8 @@ use closecall_traffic::{Segment, input};
 pub use dom::ImportError;
 
 use self::dom::{Node, parse};
-use self::formula::Values;
+use self::entities::Entities;
+use self::formula::no_parameter;
 use self::reader::Reader;
 use self::road::ImportedRoad;
 use self::storyboard::Storyboard;
@@ -110,34 +113,21 @@ fn read_text(path: &Path) -> Result<String, ImportFailure> {
 /// # Errors
 /// [`ImportFailure`] with file, line and element.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFailure> {
-    let root = parse(path, &read_text(path)?)?;
-    let mut reader = Reader { path: path.to_owned(), values: Values::new() };
+    let mut root = parse(path, &read_text(path)?)?;
+    let reader = Reader { path: path.to_owned() };
     check_kind(&reader, &root)?;
     if let Some(text) = text_of_closecall(&root) {
         return of_closecall(&reader, &root, (text, options));
     }
-    structure::check(&reader, &root)?;
-    for declaration in root.child("ParameterDeclarations").into_iter().flat_map(|list| list.all("ParameterDeclaration"))
-    {
-        let name = reader.text(declaration, "name")?;
-        let stated = options.parameters.iter().find(|(option, _)| *option == name).map(|(_, value)| value.clone());
-        let value = match stated {
-            Some(value) => value,
-            None => reader.text(declaration, "value")?,
-        };
-        reader.values.insert(name, value);
-    }
-    if let Some((unknown, _)) = options.parameters.iter().find(|(name, _)| !reader.values.contains_key(name)) {
-        let names: Vec<_> = reader.values.keys().map(String::as_str).collect();
-        return Err(reader
-            .error(&root, format!("there is no parameter `{unknown}`, only {}", names.join(", ")))
-            .into());
-    }
-    let (vehicles, controlled) = entities::read(&reader, &root)?;
+    check_options(&reader, &root, options)?;
+    let mut notes = structure::check(path, &mut root, &options.parameters.iter().cloned().collect())?;
+    let Entities { vehicles, controlled, notes: of_entities } = entities::read(&reader, &root)?;
+    notes.extend(of_entities);
     let ego = ego_of(&reader, &root, (&vehicles, &controlled), options.ego.as_deref())?;
     let storyboard = reader.child(&root, &["Storyboard"])?;
     let road = road_of(&reader, &root, storyboard)?;
     let mut played = Storyboard::new(reader.clone(), &road, vehicles, ego);
+    played.notes = notes;
     played.notes.extend(road.notes.iter().map(|note| format!("the road has {note}")));
     let globals = played.init(storyboard)?;
     let starts = played.vehicles.clone();
@@ -147,6 +137,16 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     let parsed = ScenarioFile::parse(path, &text, &[]).and_then(|file| file.check());
     parsed.map_err(|source| at_element(&reader, (&root, &starts), source))?;
     Ok(Imported { text, notes: played.notes, events: played.events })
+}
+
+/// Checks that the file declares the parameters whose values the options give.
+fn check_options(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<(), ImportError> {
+    let lists = root.all("ParameterDeclarations").flat_map(|list| list.all("ParameterDeclaration"));
+    let names: BTreeSet<&str> = lists.filter_map(|declaration| declaration.raw("name")).collect();
+    match options.parameters.iter().find(|(name, _)| !names.contains(name.as_str())) {
+        Some((unknown, _)) => Err(reader.error(root, no_parameter(unknown, &names))),
+        None => Ok(()),
+    }
 }
 
 /// Returns the error of the scenario that a file describes at the element that describes its part: the
@@ -327,11 +327,8 @@ fn environment(reader: &Reader, globals: &[Node], notes: &mut Vec<String>) -> Re
             }
             keys.push(format!("visibility-m = {:?}", visibility_m.clamp(20.0, 100_000.0)));
         }
-        if let Some(rain) = environment.at(&["Weather", "Precipitation"])
-            && rain.raw("precipitationType") == Some("rain")
-        {
-            let key = if rain.raw("precipitationIntensity").is_some() { "precipitationIntensity" } else { "intensity" };
-            keys.push(format!("rain-mm-per-h = {:?}", reader.number(rain, key)?));
+        if let Some(rain) = environment.at(&["Weather", "Precipitation"]) {
+            keys.extend(rain_key(reader, rain, notes)?);
         }
         if let Some(surface) = environment.child("RoadCondition") {
             keys.push(format!("friction = {:?}", DRY_FRICTION * reader.number(surface, "frictionScaleFactor")?));
@@ -339,6 +336,25 @@ fn environment(reader: &Reader, globals: &[Node], notes: &mut Vec<String>) -> Re
         notes.push(format!("line {}: of the environment, visibility, rain and friction are read", action.line));
     }
     Ok(keys.join(", "))
+}
+
+/// Returns the key of the rain, or `None` if there is none.
+fn rain_key(reader: &Reader, rain: &Node, notes: &mut Vec<String>) -> Result<Option<String>, ImportError> {
+    let kind = reader.text(rain, "precipitationType")?;
+    if kind == "dry" {
+        return Ok(None);
+    }
+    // Version 1.0 has an intensity without a unit, from 0 to 1.
+    let has_unit = rain.raw("precipitationIntensity").is_some();
+    let intensity = reader.number(rain, if has_unit { "precipitationIntensity" } else { "intensity" })?;
+    if kind == "rain" && has_unit {
+        return Ok(Some(format!("rain-mm-per-h = {intensity:?}")));
+    }
+    if intensity > 0.0 {
+        let reason = if kind == "snow" { "a scenario has no snow" } else { "an `intensity` has no unit" };
+        notes.push(format!("line {}: `{}`: {reason}: it does not fall", rain.line, rain.name));
+    }
+    Ok(None)
 }
 
 /// Returns the name as Closecall writes names.

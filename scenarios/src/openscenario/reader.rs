@@ -1,15 +1,14 @@
-//! Reads attributes of elements: numbers and words, with their parameters replaced.
+//! Reads attributes of elements: numbers and words. Their parameters are replaced before, see
+//! [`super::structure`].
 
 use std::path::{Path, PathBuf};
 
 use super::dom::{ImportError, Node};
-use super::formula::{Values, resolve};
 
-/// A file with the values of its parameters.
+/// A file whose elements are read.
 #[derive(Clone, Debug)]
 pub(super) struct Reader {
     pub(super) path: PathBuf,
-    pub(super) values: Values,
 }
 
 impl Reader {
@@ -30,14 +29,8 @@ impl Reader {
         }
     }
 
-    /// Returns an attribute as text, or `None` if it is absent.
-    pub(super) fn optional(&self, node: &Node, name: &str) -> Result<Option<String>, ImportError> {
-        let resolved = node.raw(name).map(|text| resolve(text, &self.values));
-        resolved.transpose().map_err(|message| self.error(node, format!("`{name}`: {message}")))
-    }
-
     pub(super) fn text(&self, node: &Node, name: &str) -> Result<String, ImportError> {
-        self.optional(node, name)?.ok_or_else(|| self.error(node, format!("it needs `{name}`")))
+        node.raw(name).map(str::to_owned).ok_or_else(|| self.error(node, format!("it needs `{name}`")))
     }
 
     pub(super) fn number(&self, node: &Node, name: &str) -> Result<f64, ImportError> {
@@ -52,12 +45,13 @@ impl Reader {
         if node.raw(name).is_some() { self.number(node, name) } else { Ok(default) }
     }
 
-    pub(super) fn is_true(&self, node: &Node, name: &str) -> Result<bool, ImportError> {
-        Ok(self.optional(node, name)?.is_some_and(|text| text == "true" || text == "1"))
-    }
-
     /// Returns the path that an attribute names, relative to the folder of the file.
     pub(super) fn path_in(&self, node: &Node, name: &str) -> Result<PathBuf, ImportError> {
         Ok(self.path.parent().unwrap_or(Path::new("")).join(self.text(node, name)?))
     }
+}
+
+/// Returns whether an attribute is true; an absent one is false.
+pub(super) fn is_true(node: &Node, name: &str) -> bool {
+    matches!(node.raw(name), Some("true" | "1"))
 }

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
-use super::reader::Reader;
+use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
 use super::world::Vehicle;
 
@@ -31,6 +31,14 @@ const SAME: f64 = 1e-9;
 pub(super) struct ElementState {
     pub(super) started_s: f64,
     pub(super) ended_s: Option<f64>,
+}
+
+/// An element of the storyboard by which a condition names it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct StoryboardElement {
+    /// Its kind as in `storyboardElementType`, such as `maneuverGroup`.
+    pub(super) kind: String,
+    pub(super) name: String,
 }
 
 /// A lane change that a vehicle makes.
@@ -63,6 +71,8 @@ struct RunningEvent {
     name: String,
     maneuver: String,
     is_longitudinal: Vec<usize>,
+    /// The names of its actions. Each ends with the event.
+    names: Vec<String>,
     actions: Vec<Running>,
 }
 
@@ -75,7 +85,7 @@ pub(super) struct Storyboard<'a> {
     pub(super) time_s: f64,
     pub(super) memories: BTreeMap<usize, Memory>,
     pub(super) states: BTreeMap<String, ElementState>,
-    pub(super) names: BTreeSet<String>,
+    pub(super) names: BTreeSet<StoryboardElement>,
     running: Vec<RunningEvent>,
     done: BTreeSet<usize>,
     /// Time and speed of each vehicle in each step.
@@ -125,16 +135,11 @@ impl<'a> Storyboard<'a> {
 
     /// Plays the storyboard to its end.
     pub(super) fn play(&mut self, storyboard: &Node) -> Result<(), ImportError> {
-        self.collect_names(storyboard)?;
+        self.collect_names(storyboard);
         let mut last_action_s = 0.0;
         loop {
-            for story in storyboard.all("Story") {
-                let outer = self.reader.values.clone();
-                self.declare(story)?;
-                for act in story.all("Act") {
-                    self.act(act)?;
-                }
-                self.reader.values = outer;
+            for act in storyboard.all("Story").flat_map(|story| story.all("Act")) {
+                self.act(act)?;
             }
             if !self.running.is_empty() {
                 last_action_s = self.time_s;
@@ -157,26 +162,16 @@ impl<'a> Storyboard<'a> {
         }
     }
 
-    fn collect_names(&mut self, node: &Node) -> Result<(), ImportError> {
+    fn collect_names(&mut self, node: &Node) {
         for child in &node.children {
             if matches!(child.name.as_str(), "Story" | "Act" | "ManeuverGroup" | "Maneuver" | "Event" | "Action")
                 && let Some(name) = child.raw("name")
             {
-                self.names.insert(name.to_owned());
+                let kind = child.name[..1].to_ascii_lowercase() + &child.name[1..];
+                self.names.insert(StoryboardElement { kind, name: name.to_owned() });
             }
-            self.collect_names(child)?;
+            self.collect_names(child);
         }
-        Ok(())
-    }
-
-    /// Adds the parameters that an element declares, unless they have values already.
-    pub(super) fn declare(&mut self, node: &Node) -> Result<(), ImportError> {
-        let lists = node.child("ParameterDeclarations").into_iter();
-        for declaration in lists.flat_map(|list| list.all("ParameterDeclaration")) {
-            let (name, value) = (self.reader.text(declaration, "name")?, self.reader.text(declaration, "value")?);
-            self.reader.values.entry(name).or_insert(value);
-        }
-        Ok(())
     }
 
     fn start(&mut self, name: &str) {
@@ -220,10 +215,7 @@ impl<'a> Storyboard<'a> {
                 actors.push(self.index(entity, "entityRef")?);
             }
             for maneuver in group.all("Maneuver") {
-                let outer = self.reader.values.clone();
-                self.declare(maneuver)?;
                 self.maneuver(maneuver, &actors)?;
-                self.reader.values = outer;
             }
         }
         Ok(())
@@ -239,6 +231,13 @@ impl<'a> Storyboard<'a> {
             if !self.done.contains(&key) {
                 // The conditions of an event are looked at until it begins.
                 if self.is_triggered(event.child("StartTrigger"))? {
+                    if event.raw("priority") == Some("skip")
+                        && self.running.iter().any(|running| running.maneuver == name)
+                    {
+                        let message = "`priority` is `skip`, and another event of the manoeuvre runs when it begins: a \
+                                       skipped event is not read";
+                        return Err(self.reader.error(event, message));
+                    }
                     self.done.insert(key);
                     self.start(&event_name);
                     self.events.push((self.time_s, format!("{event_name} begins")));
@@ -254,31 +253,21 @@ impl<'a> Storyboard<'a> {
     }
 
     fn begin(&mut self, event: &Node, (name, maneuver): (&str, &str), actors: &[usize]) -> Result<(), ImportError> {
-        if self.reader.number_or(event, "maximumExecutionCount", 1.0)? > 1.0 {
-            return Err(self.reader.error(event, "`maximumExecutionCount` must be 1: an event happens once"));
-        }
         let priority = self.reader.text(event, "priority")?;
         if matches!(priority.as_str(), "override" | "overwrite") {
-            let ended: Vec<String> = self
-                .running
-                .iter()
-                .filter(|running| running.maneuver == maneuver)
-                .map(|running| running.name.clone())
-                .collect();
-            self.running.retain(|running| running.maneuver != maneuver);
-            for ended in ended {
-                self.end(&ended);
-            }
+            self.end_events(|running| running.maneuver == maneuver);
         }
         let mut running = RunningEvent {
             name: name.to_owned(),
             maneuver: maneuver.to_owned(),
             is_longitudinal: Vec::new(),
+            names: Vec::new(),
             actions: Vec::new(),
         };
         for action in event.all("Action") {
             let action_name = action.raw("name").unwrap_or_default().to_owned();
             self.start(&action_name);
+            running.names.push(action_name);
             let inner = self.reader.only(action)?;
             if inner.name != "PrivateAction" {
                 return Err(self.reader.error(inner, "only actions of vehicles are read"));
@@ -298,7 +287,7 @@ impl<'a> Storyboard<'a> {
             });
         }
         self.running.push(running);
-        self.end_events();
+        self.end_events(|event| event.actions.is_empty());
         Ok(())
     }
 
@@ -352,7 +341,7 @@ impl<'a> Storyboard<'a> {
                 let is_factor = self.reader.text(target, "speedTargetValueType")? == "factor";
                 let base_mps = self.vehicles[other].speed_mps;
                 let speed_mps = if is_factor { base_mps * value } else { base_mps + value };
-                let stays = self.reader.is_true(target, "continuous")?;
+                let stays = is_true(target, "continuous");
                 Ok((speed_mps, stays.then_some(Running::Relative { vehicle: 0, other, value, is_factor })))
             }
             _ => Err(self.reader.error(target, "this target is not read")),
@@ -527,16 +516,20 @@ impl<'a> Storyboard<'a> {
         for (vehicle, before_mps) in self.vehicles.iter_mut().zip(before) {
             vehicle.acceleration_mps2 = (vehicle.speed_mps - before_mps) / STEP_S;
         }
-        self.end_events();
+        self.end_events(|event| event.actions.is_empty());
     }
 
-    /// Ends the events whose actions are over.
-    fn end_events(&mut self) {
-        let ended: Vec<String> =
-            self.running.iter().filter(|event| event.actions.is_empty()).map(|event| event.name.clone()).collect();
-        self.running.retain(|event| !event.actions.is_empty());
-        for name in ended {
-            self.end(&name);
+    /// Ends the events that have a property, with their actions.
+    fn end_events(&mut self, is_over: impl Fn(&RunningEvent) -> bool) {
+        let (over, running) = std::mem::take(&mut self.running).into_iter().partition(is_over);
+        self.running = running;
+        for event in over {
+            self.end(&event.name);
+            for action in event.names {
+                if let Some(state) = self.states.get_mut(&action).filter(|state| state.ended_s.is_none()) {
+                    state.ended_s = Some(self.time_s);
+                }
+            }
         }
     }
 
@@ -586,6 +579,13 @@ impl<'a> Storyboard<'a> {
                                 inner.line, self.vehicles[vehicle].name
                             ));
                         }
+                        let shape = inner.child("SpeedActionDynamics").and_then(|dynamics| dynamics.raw("dynamicsShape"));
+                        if round == 1 && shape.is_some_and(|shape| shape != "step") {
+                            self.notes.push(format!(
+                                "line {}: `{}` starts with the target speed, and does not come to it",
+                                inner.line, self.vehicles[vehicle].name
+                            ));
+                        }
                         // In the first round, the speed of another vehicle may not be set yet.
                         let is_last = round == 1;
                         self.vehicles[vehicle].speed_mps =
@@ -611,21 +611,29 @@ impl<'a> Storyboard<'a> {
     /// Puts a vehicle at the distance from another that an action asks for at the beginning.
     fn keep_distance(&mut self, node: &Node, vehicle: usize) -> Result<(), ImportError> {
         let other = self.index(node, "entityRef")?;
-        if self.reader.is_true(node, "continuous")? {
+        if is_true(node, "continuous") {
             return Err(self
                 .reader
                 .error(node, "`continuous` must be `false`: a vehicle does not follow another by an action"));
         }
+        let is_behind = match node.raw("displacement") {
+            Some("trailingReferencedEntity") => true,
+            Some("leadingReferencedEntity") => false,
+            _ => self.vehicles[vehicle].s_m < self.vehicles[other].s_m,
+        };
+        if node.raw("distance").is_some() && node.raw("timeGap").is_some() {
+            return Err(self.reader.error(node, "it has `distance` and `timeGap`: it must have one of them"));
+        }
         let distance_m = match node.raw("distance") {
             Some(_) => self.reader.number(node, "distance")?,
             None => {
-                let behind = if self.vehicles[vehicle].s_m < self.vehicles[other].s_m { vehicle } else { other };
+                let behind = if is_behind { vehicle } else { other };
                 self.reader.number(node, "timeGap")? * self.vehicles[behind].speed_mps
             }
         };
-        let is_free_space = self.reader.is_true(node, "freespace")?;
+        let is_free_space = is_true(node, "freespace");
         let (follower, leader) = (&self.vehicles[vehicle], &self.vehicles[other]);
-        let sign = if follower.s_m < leader.s_m { -1.0 } else { 1.0 };
+        let sign = if is_behind { -1.0 } else { 1.0 };
         let s_m = match (is_free_space, sign > 0.0) {
             (false, _) => leader.s_m + sign * distance_m,
             (true, true) => leader.front_m() + distance_m - (follower.back_m() - follower.s_m),
