@@ -128,6 +128,49 @@ fn a_logical_scenario_of_closecall_comes_back_as_it_left() {
 }
 
 #[test]
+fn a_vehicle_that_keeps_its_distance_becomes_a_driver_that_follows() {
+    for name in ["rear-follower-stays", "rear-follower-stays-lead-brakes"] {
+        let folder = tempfile::tempdir().unwrap();
+        let case = folder.path().join("case");
+        let words = ["tool", "export", name, "--sensors", "object", "--form", "closed-loop", "-o"];
+        stdout(&closecall([&words[..], &[case.to_str().unwrap()]].concat()), 0);
+        let output = folder.path().join("scenario.toml");
+        let said = stdout(&imported(&case.join("closed-loop.xosc"), &output, &[]), 0);
+        assert!(said.contains("`rear` follows `ego`: from the start, a driver of Wiedemann 99"), "{said}");
+        let text = fs::read_to_string(&output).unwrap();
+        let scenario: toml::Table = toml::from_str(&text).unwrap();
+        let rear = scenario["actor"].as_array().unwrap().iter().find(|actor| actor["id"].as_str() == Some("rear"));
+        // The library draws cc1 from 0.1 to 0.4 s.
+        let cc1_s = rear.unwrap()["driver"]["wiedemann99"]["cc1-s"].as_float().unwrap();
+        assert!((0.1..=0.4).contains(&cc1_s), "{text}");
+        let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
+        json(&closecall(run), 0);
+    }
+}
+
+#[test]
+fn a_distance_that_no_driver_keeps_is_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let start = SCENARIO.find("<LateralAction>").unwrap();
+    let end = SCENARIO.find("</LateralAction>").unwrap() + "</LateralAction>".len();
+    for (attributes, word) in [
+        ("distance=\"20\" continuous=\"false\"", "`continuous` must be `true`"),
+        ("distance=\"20\" continuous=\"true\"", "`Slow_Truck` is not behind `Ego`"),
+        ("distance=\"-20\" continuous=\"true\"", "`distance` is `-20`"),
+    ] {
+        let action = format!("<LongitudinalDistanceAction entityRef=\"Ego\" freespace=\"true\" {attributes}/>");
+        let action = format!("<LongitudinalAction>{action}</LongitudinalAction>");
+        let scenario = [&SCENARIO[..start], action.as_str(), &SCENARIO[end..]].concat();
+        let refused = imported(&written(folder.path(), &scenario, ROAD), &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{said}");
+        assert!(said.contains("`LongitudinalDistanceAction`") && said.contains(word), "{said}");
+        assert!(!output.exists());
+    }
+}
+
+#[test]
 fn a_scenario_command_says_which_command_imports_xml() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(folder.path(), SCENARIO, ROAD);

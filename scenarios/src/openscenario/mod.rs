@@ -13,6 +13,7 @@
 mod condition;
 mod dom;
 mod entities;
+mod follow;
 mod formula;
 mod reader;
 mod road;
@@ -416,7 +417,9 @@ fn scenario_text(
             played.notes.push(format!("`{}` starts with the {at_start} m/s that its first action sets", start.name));
             speeds.iter_mut().take_while(|(at_s, _)| *at_s <= AT_START_S).for_each(|(_, mps)| *mps = at_start);
         }
-        for pair in speeds.windows(2).filter(|pair| index != played.ego && (pair[1].1 - pair[0].1).abs() > JUMP_MPS) {
+        let follows = played.following.iter().find(|following| following.vehicle == index).copied();
+        let is_prescribed = index != played.ego && follows.is_none();
+        for pair in speeds.windows(2).filter(|pair| is_prescribed && (pair[1].1 - pair[0].1).abs() > JUMP_MPS) {
             played.notes.push(format!(
                 "`{}` changes its speed at once at {:.2} s, by {:.2} m/s: here it takes as long as a vehicle needs",
                 start.name,
@@ -444,6 +447,16 @@ fn scenario_text(
                 actors,
                 "driver = {{ ego-stack = {{ acc = {{ time-gap-s = {TIME_GAP_S:?}{set} }}, aeb = {{}}, mis = {{}} }} }} # assumed: the file has no such controller"
             );
+            continue;
+        }
+        if let Some(following) = follows {
+            if played.moves[index] > 1 {
+                let message = format!("`{}` has other actions: a driver that follows has none", start.name);
+                let (line, element) = (following.line, "LongitudinalDistanceAction".to_owned());
+                return Err(ImportError { path: path.to_owned(), line, element, message });
+            }
+            let desired_mps = speeds.iter().map(|(_, mps)| *mps).fold(speed_mps, f64::max);
+            let _ = writeln!(actors, "driver = {}", following.driver(desired_mps));
             continue;
         }
         let profile: Vec<_> =

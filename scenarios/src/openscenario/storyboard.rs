@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
+use super::follow::Following;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
 use super::world::Vehicle;
@@ -61,6 +62,8 @@ enum Running {
     Relative { vehicle: usize, other: usize, value: f64, is_factor: bool },
     /// Speeds at times, linear in between.
     Profile { vehicle: usize, points: Vec<(f64, f64)> },
+    /// A gap to another vehicle, for ever.
+    Follow(Following),
     /// A lane change, until its end.
     Lane { ends_s: f64 },
 }
@@ -91,6 +94,10 @@ pub(super) struct Storyboard<'a> {
     /// Time and speed of each vehicle in each step.
     pub(super) speeds: Vec<Vec<(f64, f64)>>,
     pub(super) lane_changes: Vec<LaneChange>,
+    /// The vehicles that follow another.
+    pub(super) following: Vec<Following>,
+    /// Number of actions during the run by which each vehicle moves.
+    pub(super) moves: Vec<usize>,
     /// Times of the events, for the reader of the result.
     pub(super) events: Vec<(f64, String)>,
     pub(super) notes: Vec<String>,
@@ -100,7 +107,7 @@ pub(super) struct Storyboard<'a> {
 
 impl<'a> Storyboard<'a> {
     pub(super) fn new(reader: Reader, road: &'a ImportedRoad, vehicles: Vec<Vehicle>, ego: usize) -> Self {
-        let speeds = vec![Vec::new(); vehicles.len()];
+        let (speeds, moves) = (vec![Vec::new(); vehicles.len()], vec![0; vehicles.len()]);
         Self {
             reader,
             road,
@@ -114,6 +121,8 @@ impl<'a> Storyboard<'a> {
             done: BTreeSet::new(),
             speeds,
             lane_changes: Vec::new(),
+            following: Vec::new(),
+            moves,
             events: Vec::new(),
             notes: Vec::new(),
             end_s: 0.0,
@@ -282,7 +291,8 @@ impl<'a> Storyboard<'a> {
             other.actions.retain(|action| match action {
                 Running::Speed { vehicle, .. }
                 | Running::Relative { vehicle, .. }
-                | Running::Profile { vehicle, .. } => !replaced.contains(vehicle),
+                | Running::Profile { vehicle, .. }
+                | Running::Follow(Following { vehicle, .. }) => !replaced.contains(vehicle),
                 Running::Lane { .. } => true,
             });
         }
@@ -299,15 +309,22 @@ impl<'a> Storyboard<'a> {
                 node.line, node.name
             ));
         }
+        if matches!(node.name.as_str(), "LongitudinalAction" | "LateralAction") {
+            self.moves[actor] += 1;
+        }
         match node.name.as_str() {
             "LongitudinalAction" => {
                 let inner = self.reader.only(&node)?.clone();
                 match inner.name.as_str() {
                     "SpeedAction" => self.speed_action(&inner, actor, running),
                     "SpeedProfileAction" => self.speed_profile(&inner, actor, running),
-                    _ => Err(self
-                        .reader
-                        .error(&inner, "during a run, only `SpeedAction` and `SpeedProfileAction` are read")),
+                    "LongitudinalDistanceAction" => {
+                        let following = self.follow(&inner, actor)?;
+                        running.is_longitudinal.push(actor);
+                        running.actions.push(Running::Follow(following));
+                        Ok(())
+                    }
+                    _ => Err(self.reader.error(&inner, "this action is not read")),
                 }
             }
             "LateralAction" => {
@@ -484,7 +501,7 @@ impl<'a> Storyboard<'a> {
         }
         self.time_s = ((self.time_s + STEP_S) / STEP_S).round() * STEP_S;
         let before: Vec<f64> = self.vehicles.iter().map(|vehicle| vehicle.speed_mps).collect();
-        let (time_s, mut set) = (self.time_s, Vec::new());
+        let (time_s, vehicles, mut set) = (self.time_s, &self.vehicles, Vec::new());
         for event in &mut self.running {
             event.actions.retain(|action| match action {
                 Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, is_smooth } => {
@@ -506,6 +523,10 @@ impl<'a> Storyboard<'a> {
                     let speed_mps = next.map_or(v0, |(t1, v1)| v0 + (v1 - v0) * (time_s - t0) / (t1 - t0));
                     set.push((*vehicle, speed_mps));
                     next.is_some()
+                }
+                Running::Follow(following) => {
+                    set.push((following.vehicle, following.next_speed_mps(vehicles)));
+                    true
                 }
                 Running::Lane { ends_s } => time_s < *ends_s - 1e-9,
             });
@@ -579,7 +600,8 @@ impl<'a> Storyboard<'a> {
                                 inner.line, self.vehicles[vehicle].name
                             ));
                         }
-                        let shape = inner.child("SpeedActionDynamics").and_then(|dynamics| dynamics.raw("dynamicsShape"));
+                        let dynamics = inner.child("SpeedActionDynamics");
+                        let shape = dynamics.and_then(|dynamics| dynamics.raw("dynamicsShape"));
                         if round == 1 && shape.is_some_and(|shape| shape != "step") {
                             self.notes.push(format!(
                                 "line {}: `{}` starts with the target speed, and does not come to it",
