@@ -149,6 +149,120 @@ fn a_vehicle_that_keeps_its_distance_becomes_a_driver_that_follows() {
 }
 
 #[test]
+fn the_open_loop_that_closecall_exports_is_imported_with_its_speeds() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let words = ["tool", "export", "rear-follower-stays", "--sensors", "object", "--form", "open-loop", "-o"];
+    stdout(&closecall([&words[..], &[case.to_str().unwrap()]].concat()), 0);
+    let output = folder.path().join("scenario.toml");
+    let said = stdout(&imported(&case.join("open-loop.xosc"), &output, &[]), 0);
+    assert!(said.contains("of the trajectory of `rear`, speeds and lane changes are read"), "{said}");
+    let text = fs::read_to_string(&output).unwrap();
+    let scenario: toml::Table = toml::from_str(&text).unwrap();
+    let rear = scenario["actor"].as_array().unwrap().iter().find(|actor| actor["id"].as_str() == Some("rear")).unwrap();
+    let profile = rear["driver"]["prescribed"]["profile"].as_array().unwrap();
+    // It closes in on the ego, and slows down behind it.
+    let speed_mps = |point: &toml::Value| point[1].as_float().unwrap();
+    assert!(speed_mps(&profile[0]) > speed_mps(profile.last().unwrap()) + 1.0, "{text}");
+    let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
+    json(&closecall(run), 0);
+}
+
+/// Returns the scenario with a trajectory in place of the lane change, through points with time (s),
+/// lane and position (m).
+fn with_trajectory(attributes: &str, points: &[(f64, i32, f64)]) -> String {
+    let start = SCENARIO.find("<LateralAction>").unwrap();
+    let end = SCENARIO.find("</LateralAction>").unwrap() + "</LateralAction>".len();
+    let vertices: String = points
+        .iter()
+        .map(|(at_s, lane, s_m)| {
+            format!(
+                "<Vertex time=\"{at_s}\"><Position><LanePosition roadId=\"1\" laneId=\"{lane}\" s=\"{s_m}\"/>\
+                 </Position></Vertex>"
+            )
+        })
+        .collect();
+    let action = format!(
+        "<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name=\"path\" closed=\"false\"><Shape>\
+         <Polyline>{vertices}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference><Timing {attributes}/>\
+         </TimeReference><TrajectoryFollowingMode followingMode=\"position\"/></FollowTrajectoryAction></RoutingAction>"
+    );
+    [&SCENARIO[..start], action.as_str(), &SCENARIO[end..]].concat()
+}
+
+#[test]
+fn a_trajectory_becomes_speeds_and_lane_changes() {
+    const TIMING: &str = "domainAbsoluteRelative=\"relative\" scale=\"1\" offset=\"0\"";
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // The cut-in begins at 3 s, when the truck is at 170 m.
+    let points = [(0.0, -2, 170.0), (1.0, -2, 190.0), (5.0, -1, 270.0), (8.0, -1, 330.0)];
+    let path = written(folder.path(), &with_trajectory(TIMING, &points), ROAD);
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    assert!((time_of(&said, "cut-in ends") - 11.0).abs() <= 0.021, "{said}");
+    let text = fs::read_to_string(&output).unwrap();
+    let scenario: toml::Table = toml::from_str(&text).unwrap();
+    let change = &scenario["actor"][1]["driver"]["prescribed"]["lane-changes"][0];
+    assert_eq!(change["to"].as_str(), Some("left"));
+    // From 10 % to 90 % of the way it takes 3.2 s, as the path of a lane change of 6.3 s.
+    assert!((change["duration-s"].as_float().unwrap() - 6.315).abs() < 0.01, "{text}");
+    let never = TIMING.replace("relative", "never");
+    let absolute = TIMING.replace("relative", "absolute");
+    let wrong: [(&str, &[(f64, i32, f64)], &str); 7] = [
+        (TIMING, &[(0.0, -2, 100.0), (1.0, -2, 120.0)], "its trajectory begins at s = 100.00 m"),
+        (TIMING, &[(0.0, -2, 170.0), (1.0, -2, 160.0)], "-10.00 m/s"),
+        (TIMING, &[(0.0, -2, 170.0), (0.0, -2, 190.0)], "`time` must grow"),
+        (TIMING, &[(0.0, -2, 170.0)], "two vertices"),
+        (TIMING, &[(0.0, -2, 170.0), (1.0, -3, 190.0)], "lane -3 is no driving lane"),
+        (&never, &points, "one of absolute, relative"),
+        (&absolute, &points, "begins at 0.00 s, and its event at 3.0"),
+    ];
+    for (attributes, points, word) in wrong {
+        fs::remove_file(&output).ok();
+        let refused = imported(&written(folder.path(), &with_trajectory(attributes, points), ROAD), &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{said}");
+        assert!(said.contains("case.xosc:") && said.contains(word), "{word}: {said}");
+        assert!(!output.exists());
+    }
+    let nurbs = with_trajectory(TIMING, &points).replace("Polyline>", "Nurbs>");
+    let refused = imported(&written(folder.path(), &nurbs, ROAD), &output, &[]);
+    assert!(message(&refused).contains("`Nurbs`: it is not read"), "{}", message(&refused));
+}
+
+#[test]
+fn a_position_in_the_plane_is_a_position_on_the_road() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let in_plane = |attributes: &str| {
+        SCENARIO.replacen(
+            "<LanePosition roadId=\"1\" laneId=\"-1\" s=\"50\" offset=\"0\"/>",
+            &format!("<WorldPosition {attributes}/>"),
+            1,
+        )
+    };
+    let straight = ROAD.replace("<arc curvature=\"0.001\"/>", "<line/>");
+    let path = written(folder.path(), &in_plane("x=\"50\" y=\"-1.75\" h=\"0\""), &straight);
+    stdout(&imported(&path, &output, &[]), 0);
+    let scenario: toml::Table = toml::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
+    let start = &scenario["actor"][0]["start"]["absolute"];
+    assert_eq!((start["s-m"].as_float(), start["lane"].as_integer()), (Some(51.4), Some(1)));
+    let anywhere = straight.replace("hdg=\"0\"", "");
+    for (attributes, road, word) in [
+        ("x=\"50\" y=\"-1.75\" h=\"1.57\"", straight.as_str(), "not the direction of the road"),
+        ("x=\"50\" y=\"9\" h=\"0\"", straight.as_str(), "10.75 m beside the nearest lane"),
+        ("x=\"50\" y=\"-1.75\"", anywhere.as_str(), "needs a road that is one line or one arc"),
+    ] {
+        fs::remove_file(&output).ok();
+        let refused = imported(&written(folder.path(), &in_plane(attributes), road), &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{said}");
+        assert!(said.contains("`WorldPosition`") && said.contains(word), "{said}");
+        assert!(!output.exists());
+    }
+}
+
+#[test]
 fn a_distance_that_no_driver_keeps_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");

@@ -15,11 +15,13 @@ mod dom;
 mod entities;
 mod follow;
 mod formula;
+mod plane;
 mod reader;
 mod road;
 mod standard;
 mod storyboard;
 mod structure;
+mod trajectory;
 mod world;
 
 use std::collections::BTreeSet;
@@ -35,7 +37,7 @@ use self::dom::{Node, parse};
 use self::entities::Entities;
 use self::formula::no_parameter;
 use self::reader::Reader;
-use self::road::ImportedRoad;
+use self::road::{ImportedRoad, UsedRoad};
 use self::storyboard::Storyboard;
 use self::world::Vehicle;
 use crate::{ScenarioError, ScenarioFile, Setting};
@@ -287,24 +289,31 @@ fn road_of(reader: &Reader, root: &Node, storyboard: &Node) -> Result<ImportedRo
     let network = reader.child(root, &["RoadNetwork"])?;
     let logic = reader.child(network, &["LogicFile"])?;
     let mut stack = vec![storyboard];
-    let mut first = None;
+    let (mut first, mut is_in_plane) = (None, false);
     while let Some(node) = stack.pop() {
         if node.name == "LanePosition" {
             first = Some(node);
             break;
         }
+        is_in_plane |= node.name == "WorldPosition";
         stack.extend(node.children.iter().rev());
     }
-    let Some(position) = first else {
-        return Err(reader.error(storyboard, "no vehicle starts at a `LanePosition`, which says on which road").into());
+    let used = match first {
+        #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
+        Some(position) => UsedRoad::Lane {
+            road_id: reader.text(position, "roadId")?,
+            lane: reader.number(position, "laneId")? as i32,
+        },
+        None if is_in_plane => UsedRoad::Only,
+        None => {
+            let message = "no vehicle starts at a `LanePosition` or a `WorldPosition`, which says on which road";
+            return Err(reader.error(storyboard, message).into());
+        }
     };
-    let road_id = reader.text(position, "roadId")?;
-    #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
-    let lane = reader.number(position, "laneId")? as i32;
     let path = reader.path_in(logic, "filepath")?;
     let text = input::read_text(&path)
         .map_err(|error| reader.error(logic, format!("failed to read {}: {error}", path.display())))?;
-    Ok(road::read(&path, &text, (&road_id, lane))?)
+    Ok(road::read(&path, &text, &used)?)
 }
 
 /// Returns the environment as a table of TOML.
@@ -465,7 +474,7 @@ fn scenario_text(
         for change in played.lane_changes.iter().filter(|change| change.vehicle == index) {
             if !(LANE_CHANGE_S[0]..=LANE_CHANGE_S[1]).contains(&change.duration_s) {
                 let message = format!("it takes {:.2} s; a lane change takes 1.5 to 20 s", change.duration_s);
-                let element = "LaneChangeAction".to_owned();
+                let element = change.element.to_owned();
                 return Err(ImportError { path: path.to_owned(), line: change.line, element, message });
             }
             let side = if change.to > change.from { "left" } else { "right" };

@@ -7,6 +7,7 @@ use std::path::Path;
 use closecall_traffic::Road;
 
 use super::dom::{ImportError, Node, parse};
+use super::plane::ReferenceLine;
 
 /// Names of the lane types on which vehicles drive.
 const DRIVING: [&str; 8] = ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
@@ -18,20 +19,34 @@ const MOST_CURVATURE_PER_M: f64 = 0.2;
 /// The part of a file's road that a scenario can use.
 #[derive(Clone, Debug)]
 pub(super) struct ImportedRoad {
+    pub(super) id: String,
     /// The lanes of OpenDRIVE on the right of the reference line, from the left.
     pub(super) lanes: Vec<i32>,
+    /// The centres of these lanes, to the left of the reference line (m).
+    pub(super) centres_m: Vec<f64>,
     pub(super) lane_width_m: f64,
     pub(super) curvature_per_m: f64,
+    /// The reference line, or `None` if it is neither one line nor one arc.
+    pub(super) line: Option<ReferenceLine>,
     pub(super) speed_limit_mps: Option<f64>,
     /// The properties that the scenario's road lacks.
     pub(super) notes: Vec<String>,
 }
 
-/// Reads a road of this number. `lane` is a lane that vehicles use.
+/// The road that a scenario uses.
+#[derive(Clone, Debug)]
+pub(super) enum UsedRoad {
+    /// The road of this number; a vehicle uses this lane.
+    Lane { road_id: String, lane: i32 },
+    /// The only road of the network.
+    Only,
+}
+
+/// Reads the road that a scenario uses.
 ///
 /// # Errors
-/// [`ImportError`] if the document is no OpenDRIVE, or the road has no such lane.
-pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Result<ImportedRoad, ImportError> {
+/// [`ImportError`] if the document is no OpenDRIVE, or has no such road or no such lane.
+pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedRoad, ImportError> {
     let root = parse(path, text)?;
     if root.name != "OpenDRIVE" {
         return Err(root.error(path, "the root element must be `OpenDRIVE`"));
@@ -44,8 +59,16 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
             return Err(road.error(path, format!("a road before it has the number `{id}` already")));
         }
     }
+    let roads: Vec<_> = root.all("road").filter_map(|road| road.raw("id")).collect();
+    let road_id = match (used, &roads[..]) {
+        (UsedRoad::Lane { road_id, .. }, _) => road_id.as_str(),
+        (UsedRoad::Only, [only]) => *only,
+        (UsedRoad::Only, _) => {
+            let message = "no position of the scenario says on which of its roads: it must have exactly one";
+            return Err(root.error(path, message));
+        }
+    };
     let Some(road) = root.all("road").find(|road| road.raw("id") == Some(road_id)) else {
-        let roads: Vec<_> = root.all("road").filter_map(|road| road.raw("id")).collect();
         return Err(root.error(path, format!("there is no road `{road_id}`, only {}", roads.join(", "))));
     };
     check_shape(path, road)?;
@@ -68,7 +91,8 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
             reason = "a lane's number is small, and compared with the text below"
         )]
         let id = id as i32;
-        let is_used = id == lane && !Road::LANE_WIDTH_M.contains(width_m);
+        let is_lane = matches!(used, UsedRoad::Lane { lane, .. } if *lane == id);
+        let is_used = is_lane && !Road::LANE_WIDTH_M.contains(width_m);
         if !(width_m >= 0.0) || is_used {
             let message = format!("`a` is {width_m}; a lane of a scenario has a width of 2.5 to 5 m");
             return Err(width.error(path, message));
@@ -79,10 +103,18 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
         driving.push((id, width_m));
     }
     driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
-    let Some(&(_, lane_width_m)) = driving.iter().find(|(id, _)| *id == lane) else {
+    let used_lane = match used {
+        UsedRoad::Lane { lane, .. } => driving.iter().find(|(id, _)| id == lane),
+        UsedRoad::Only => driving.iter().find(|(_, width_m)| Road::LANE_WIDTH_M.contains(*width_m)),
+    };
+    let Some(&(_, lane_width_m)) = used_lane else {
         let lanes: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
-        let message =
-            format!("lane {lane} is no driving lane on the right of road {road_id}, only {}", lanes.join(", "));
+        let message = match used {
+            UsedRoad::Lane { lane, .. } => {
+                format!("lane {lane} is no driving lane on the right of road {road_id}, only {}", lanes.join(", "))
+            }
+            UsedRoad::Only => "none of its lanes is a driving lane with a width of 2.5 to 5 m".to_owned(),
+        };
         return Err(right.error(path, message));
     };
     if driving.iter().any(|(_, width)| *width != lane_width_m) {
@@ -102,8 +134,52 @@ pub(super) fn read(path: &Path, text: &str, (road_id, lane): (&str, i32)) -> Res
         }
         None => None,
     };
+    let centres_m = centres_m(lanes, right, &driving);
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
-    Ok(ImportedRoad { lanes, lane_width_m, curvature_per_m, speed_limit_mps, notes })
+    let line = reference_line(path, road, curvature_per_m);
+    let id = road_id.to_owned();
+    Ok(ImportedRoad { id, lanes, centres_m, lane_width_m, curvature_per_m, line, speed_limit_mps, notes })
+}
+
+/// Returns the centres of driving lanes to the left of the reference line (m).
+fn centres_m(lanes: &Node, right: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
+    let value = |node: &Node, name: &str| node.raw(name).and_then(|text| text.trim().parse::<f64>().ok());
+    let width_m = |lane: &Node| lane.child("width").and_then(|width| value(width, "a")).unwrap_or(0.0);
+    #[expect(clippy::cast_possible_truncation, reason = "as the lanes that they are compared with")]
+    let of_lane = |lane: &Node| Some((value(lane, "id")? as i32, width_m(lane)));
+    let mut widths: Vec<(i32, f64)> = right.all("lane").filter_map(of_lane).collect();
+    widths.sort_by_key(|lane| std::cmp::Reverse(lane.0));
+    let mut left_m = lanes.child("laneOffset").and_then(|offset| value(offset, "a")).unwrap_or(0.0);
+    let mut centres_m = Vec::new();
+    for (id, width_m) in widths {
+        if driving.iter().any(|(other, _)| *other == id) {
+            centres_m.push(left_m - 0.5 * width_m);
+        }
+        left_m -= width_m;
+    }
+    centres_m
+}
+
+/// Returns the reference line of a road in the plane, or `None` if it is neither one line nor one arc,
+/// or the file does not say where it begins.
+fn reference_line(path: &Path, road: &Node, curvature_per_m: f64) -> Option<ReferenceLine> {
+    let geometries: Vec<&Node> = road.child("planView")?.all("geometry").collect();
+    let first = geometries.first()?;
+    let is_one = match first.children.first()?.name.as_str() {
+        "arc" => geometries.len() == 1 && curvature_per_m != 0.0,
+        "line" => geometries.iter().all(|geometry| {
+            let is_line = geometry.children.first().is_some_and(|shape| shape.name == "line");
+            is_line && geometry.raw("hdg") == first.raw("hdg")
+        }),
+        _ => false,
+    };
+    let value = |name| number(path, first, name).ok();
+    is_one.then_some(ReferenceLine {
+        x_m: value("x")?,
+        y_m: value("y")?,
+        heading_rad: value("hdg")?,
+        curvature_per_m,
+    })
 }
 
 /// Checks that a road can exist: its lengths and its curvatures.

@@ -10,10 +10,10 @@
 //!
 //! | attributes | reason |
 //! |---|---|
-//! | `y`, `z`, `p`, `r`, axles, `Performance`, `model3d`, `role` | a vehicle has its class, its box and its mass |
+//! | height and tilt, axles, `Performance`, `model3d`, `role` | a vehicle has class, box and mass |
 //! | `routingAlgorithm`, `alongRoute` | all lanes run along the one road |
 //! | `followingMode` | a vehicle of a scenario cannot leave its physical limits |
-//! | `Sun`, `Wind`, clouds, temperature, `TimeOfDay`, `wetness` | a note says which part of the environment is read |
+//! | `Sun`, `Wind`, clouds, `TimeOfDay`, `wetness` | a note says what of the environment is read |
 //!
 //! An element without a row is refused where it is read.
 
@@ -266,7 +266,7 @@ const STORYBOARD_ELEMENT_STATE: [&str; 7] = [
 ];
 const STORYBOARD_ELEMENT_TYPE: [&str; 6] = ["act", "action", "event", "maneuver", "maneuverGroup", "story"];
 
-static ELEMENTS: [Element; 110] = [
+static ELEMENTS: [Element; 122] = [
     element(
         "OpenSCENARIO",
         &[],
@@ -549,6 +549,26 @@ static ELEMENTS: [Element; 110] = [
     ),
     element("RelativeRoadPosition", &[text("entityRef"), number("ds"), number("dt")], &["Orientation"]),
     element("Orientation", &[number("h"), number("p"), number("r"), word("type", &REFERENCE_CONTEXT)], &[]),
+    element(
+        "RoutingAction",
+        &[],
+        &["AssignRouteAction", "FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"],
+    ),
+    element(
+        "FollowTrajectoryAction",
+        &[at_least_0("initialDistanceOffset")],
+        &["Trajectory", "CatalogReference", "TimeReference", "TrajectoryFollowingMode", "TrajectoryRef"],
+    ),
+    element("TrajectoryRef", &[], &["Trajectory", "CatalogReference"]),
+    element("Trajectory", &[boolean("closed"), text("name")], &["ParameterDeclarations", "Shape"]),
+    element("Shape", &[], &["Polyline", "Clothoid", "ClothoidSpline", "Nurbs"]),
+    element("Polyline", &[], &["Vertex*"]),
+    element("Vertex", &[number("time")], &["Position"]),
+    element("TimeReference", &[], &["None", "Timing"]),
+    element("None", &[], &[]),
+    element("Timing", &[word("domainAbsoluteRelative", &REFERENCE_CONTEXT), number("offset"), number("scale")], &[]),
+    element("TrajectoryFollowingMode", &[word("followingMode", &FOLLOWING_MODE)], &[]),
+    element("WorldPosition", &[number("h"), number("p"), number("r"), number("x"), number("y"), number("z")], &[]),
     element("Story", &[text("name")], &["ParameterDeclarations", "Act*"]),
     element("Act", &[text("name")], &["ManeuverGroup*", "StartTrigger", "StopTrigger"]),
     element(

@@ -12,6 +12,7 @@ use super::dom::{ImportError, Node};
 use super::follow::Following;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
+use super::trajectory::nearest;
 use super::world::Vehicle;
 
 /// Step of the storyboard (s): the step of esmini's tests.
@@ -22,7 +23,13 @@ const LONGEST_S: f64 = 300.0;
 const AFTER_LAST_S: f64 = 20.0;
 
 /// Highest speed of a scenario file (m/s).
-const MOST_SPEED_MPS: f64 = 100.0;
+pub(super) const MOST_SPEED_MPS: f64 = 100.0;
+
+/// Largest angle between a vehicle and the road at its start (rad): an assumption; 0.02 to 0.2 are
+/// plausible.
+const MOST_START_ANGLE_RAD: f64 = 0.1;
+/// Distance from the centre of a lane above which a note says so (m): numerical.
+const NOTED_OFFSET_M: f64 = 0.01;
 
 /// Difference of two values that are the same but for rounding: numerical.
 const SAME: f64 = 1e-9;
@@ -50,7 +57,9 @@ pub(super) struct LaneChange {
     pub(super) from: i32,
     pub(super) to: i32,
     pub(super) duration_s: f64,
+    /// The element that makes it, and its line.
     pub(super) line: usize,
+    pub(super) element: &'static str,
 }
 
 /// An action that takes time.
@@ -66,6 +75,8 @@ enum Running {
     Follow(Following),
     /// A lane change, until its end.
     Lane { ends_s: f64 },
+    /// A lane that a vehicle on a trajectory has from a time.
+    LaneFrom { vehicle: usize, at_s: f64, lane: i32 },
 }
 
 /// A running event.
@@ -293,7 +304,7 @@ impl<'a> Storyboard<'a> {
                 | Running::Relative { vehicle, .. }
                 | Running::Profile { vehicle, .. }
                 | Running::Follow(Following { vehicle, .. }) => !replaced.contains(vehicle),
-                Running::Lane { .. } => true,
+                Running::Lane { .. } | Running::LaneFrom { .. } => true,
             });
         }
         self.running.push(running);
@@ -309,7 +320,7 @@ impl<'a> Storyboard<'a> {
                 node.line, node.name
             ));
         }
-        if matches!(node.name.as_str(), "LongitudinalAction" | "LateralAction") {
+        if matches!(node.name.as_str(), "LongitudinalAction" | "LateralAction" | "RoutingAction") {
             self.moves[actor] += 1;
         }
         match node.name.as_str() {
@@ -335,6 +346,17 @@ impl<'a> Storyboard<'a> {
                         .reader
                         .error(&inner, "only `LaneChangeAction` is read: a vehicle keeps the centre of its lane")),
                 }
+            }
+            "RoutingAction" => {
+                let inner = self.reader.only(&node)?.clone();
+                match inner.name.as_str() {
+                    "FollowTrajectoryAction" => self.follow_trajectory(&inner, actor, running),
+                    _ => Err(self.reader.error(&inner, "it is not read: a vehicle has no route on one road")),
+                }
+            }
+            "SynchronizeAction" => {
+                let message = "it is not read: the speeds by which the vehicles meet are left to the player";
+                Err(self.reader.error(&node, message))
             }
             "ControllerAction" | "ActivateControllerAction" => {
                 self.notes.push(format!(
@@ -447,6 +469,25 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
+    fn follow_trajectory(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        let mut driven = self.trajectory(node, actor)?;
+        if let Some(first) = driven.speeds.first_mut() {
+            first.0 = first.0.min(self.time_s);
+        }
+        self.notes.push(format!(
+            "line {}: of the trajectory of `{}`, speeds and lane changes are read: it keeps the centre of its lane",
+            node.line, self.vehicles[actor].name
+        ));
+        for change in &driven.lane_changes {
+            let (at_s, lane) = (change.at_s, change.to);
+            running.actions.push(Running::LaneFrom { vehicle: actor, at_s, lane });
+        }
+        self.lane_changes.extend(driven.lane_changes);
+        running.is_longitudinal.push(actor);
+        running.actions.push(Running::Profile { vehicle: actor, points: driven.speeds });
+        Ok(())
+    }
+
     fn lane_change(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
         if self.reader.number_or(node, "targetLaneOffset", 0.0)? != 0.0 {
             return Err(self
@@ -482,7 +523,8 @@ impl<'a> Storyboard<'a> {
             self.transition(dynamics, (0.0, self.road.lane_width_m), self.vehicles[actor].speed_mps)?;
         let at_s = self.time_s;
         self.vehicles[actor].lane = to;
-        self.lane_changes.push(LaneChange { vehicle: actor, at_s, from, to, duration_s, line: node.line });
+        let (line, element) = (node.line, "LaneChangeAction");
+        self.lane_changes.push(LaneChange { vehicle: actor, at_s, from, to, duration_s, line, element });
         running.actions.push(Running::Lane { ends_s: at_s + duration_s });
         Ok(())
     }
@@ -501,7 +543,8 @@ impl<'a> Storyboard<'a> {
         }
         self.time_s = ((self.time_s + STEP_S) / STEP_S).round() * STEP_S;
         let before: Vec<f64> = self.vehicles.iter().map(|vehicle| vehicle.speed_mps).collect();
-        let (time_s, vehicles, mut set) = (self.time_s, &self.vehicles, Vec::new());
+        let (time_s, vehicles) = (self.time_s, &self.vehicles);
+        let (mut set, mut lanes) = (Vec::new(), Vec::new());
         for event in &mut self.running {
             event.actions.retain(|action| match action {
                 Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, is_smooth } => {
@@ -529,7 +572,17 @@ impl<'a> Storyboard<'a> {
                     true
                 }
                 Running::Lane { ends_s } => time_s < *ends_s - 1e-9,
+                Running::LaneFrom { vehicle, at_s, lane } => {
+                    let is_later = time_s < *at_s;
+                    if !is_later {
+                        lanes.push((*vehicle, *lane));
+                    }
+                    is_later
+                }
             });
+        }
+        for (vehicle, lane) in lanes {
+            self.vehicles[vehicle].lane = lane;
         }
         for (vehicle, speed_mps) in set {
             self.vehicles[vehicle].speed_mps = speed_mps.max(0.0);
@@ -665,6 +718,45 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
+    /// Returns the position along the road (m) and the lane of a position on a lane.
+    pub(super) fn on_lane(&self, node: &Node) -> Result<(f64, i32), ImportError> {
+        let road = self.reader.text(node, "roadId")?;
+        if road != self.road.id {
+            let message = format!("`roadId` is `{road}`: all vehicles must be on one road, here `{}`", self.road.id);
+            return Err(self.reader.error(node, message));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
+        let lane = self.reader.number(node, "laneId")? as i32;
+        Ok((self.reader.number(node, "s")?, lane))
+    }
+
+    /// Returns the position along the road (m) and the lane of a position in the plane.
+    fn in_plane(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(f64, i32), ImportError> {
+        let point = self.on_road(node)?;
+        let heading_rad = self.reader.number_or(node, "h", 0.0)?;
+        if let Some(line) = self.road.line
+            && !(line.angle_rad(heading_rad, point.s_m).abs() <= MOST_START_ANGLE_RAD)
+        {
+            return Err(self.reader.error(node, "`h` is not the direction of the road: a vehicle starts along it"));
+        }
+        let Some(index) = nearest(&self.road.centres_m, point.t_m) else {
+            return Err(self.reader.error(node, "the road has no lane"));
+        };
+        let beside_m = point.t_m - self.road.centres_m[index];
+        if !(beside_m.abs() <= 0.5 * self.road.lane_width_m) {
+            return Err(self.reader.error(node, format!("it lies {:.2} m beside the nearest lane", beside_m.abs())));
+        }
+        if beside_m.abs() > NOTED_OFFSET_M && round == 1 {
+            self.notes.push(format!(
+                "line {}: `{}` starts at the centre of its lane, {:.2} m beside its position in the file",
+                node.line,
+                self.vehicles[vehicle].name,
+                beside_m.abs()
+            ));
+        }
+        Ok((point.s_m, self.road.lanes[index]))
+    }
+
     fn place(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
         let reader = self.reader.clone();
         if reader.number_or(node, "offset", 0.0)? != 0.0 {
@@ -678,7 +770,8 @@ impl<'a> Storyboard<'a> {
         }
         #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
         let (s_m, lane) = match node.name.as_str() {
-            "LanePosition" => (reader.number(node, "s")?, reader.number(node, "laneId")? as i32),
+            "LanePosition" => self.on_lane(node)?,
+            "WorldPosition" => self.in_plane(node, vehicle, round)?,
             "RelativeLanePosition" => {
                 let other = self.vehicle(node, "entityRef")?;
                 let shift_m = if node.raw("ds").is_some() {
@@ -700,15 +793,17 @@ impl<'a> Storyboard<'a> {
                 (other.s_m + reader.number(node, "ds")?, self.shifted(other.lane, lanes.round() as i32))
             }
             _ => {
-                return Err(reader
-                    .error(node, "only `LanePosition`, `RelativeLanePosition` and `RelativeRoadPosition` are read"));
+                let message = "only `LanePosition`, `RelativeLanePosition`, `RelativeRoadPosition` and `WorldPosition` \
+                               are read";
+                return Err(reader.error(node, message));
             }
         };
         if !self.road.lanes.contains(&lane) {
             let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
             let message = format!("lane {lane} is no driving lane on the right of the road, only {}", lanes.join(", "));
             // The other vehicle may not be placed yet.
-            return if round == 0 && node.name != "LanePosition" { Ok(()) } else { Err(reader.error(node, message)) };
+            let is_relative = !matches!(node.name.as_str(), "LanePosition" | "WorldPosition");
+            return if round == 0 && is_relative { Ok(()) } else { Err(reader.error(node, message)) };
         }
         let placed = &mut self.vehicles[vehicle];
         (placed.s_m, placed.lane, placed.is_placed) = (s_m, lane, true);
