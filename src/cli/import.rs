@@ -16,8 +16,8 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall tool import case.xosc -o scenario.toml",
-    "closecall tool import cut-in.xosc --ego car_white -o scenario.toml",
-    "closecall tool import cut-in.xosc --parameter EgoSpeed=120 -o scenario.toml",
+    "closecall tool import cut-in.xosc --ego car_white --parameter EgoSpeed=120 -o scenario.toml",
+    "closecall tool import values.xosc --value-set 3 -o scenario.toml",
 ]))]
 pub(super) struct ImportArgs {
     /// Scenario of OpenSCENARIO XML 1.0 to 1.3; its road and its catalogues are found relative to
@@ -34,6 +34,9 @@ pub(super) struct ImportArgs {
     /// Value of a parameter of the file, instead of its default; can be given more than once
     #[arg(long = "parameter", value_name = "NAME=VALUE", value_parser = parameter, help_heading = heading::SCENARIO)]
     parameters: Vec<(String, String)>,
+    /// Number of the value set to use, from 1, if the file holds values of the parameters of a scenario
+    #[arg(long, value_name = "N", help_heading = heading::SCENARIO)]
+    value_set: Option<u64>,
 }
 
 fn parameter(text: &str) -> Result<(String, String), String> {
@@ -45,7 +48,11 @@ fn parameter(text: &str) -> Result<(String, String), String> {
 
 pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
     protect(std::slice::from_ref(&args.file), &[("--out", Some(&args.output))])?;
-    let options = ImportOptions { ego: args.ego.clone(), parameters: args.parameters.clone() };
+    let options = ImportOptions {
+        ego: args.ego.clone(),
+        parameters: args.parameters.clone(),
+        value_set: args.value_set,
+    };
     let imported = import(&args.file, &options)?;
     write_file(&args.output, |file| write!(file, "# Made by `{}`\n{}", command_line(), imported.text))?;
     print_written(&args.output);

@@ -263,6 +263,51 @@ fn a_position_in_the_plane_is_a_position_on_the_road() {
 }
 
 #[test]
+fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    written(folder.path(), SCENARIO, ROAD);
+    let path = folder.path().join("values.xosc");
+    let values = "<OpenSCENARIO><FileHeader revMajor=\"1\" revMinor=\"3\" date=\"2026-01-01T00:00:00\" \
+                  description=\"\" author=\"\"/>\n<ParameterValueDistribution><ScenarioFile \
+                  filepath=\"case.xosc\"/>\n<Deterministic><DeterministicSingleParameterDistribution \
+                  parameterName=\"Gap\"><DistributionSet><Element value=\"60\"/><Element \
+                  value=\"80\"/></DistributionSet></DeterministicSingleParameterDistribution></Deterministic>\
+                  </ParameterValueDistribution></OpenSCENARIO>";
+    fs::write(&path, values).unwrap();
+    let said = stdout(&imported(&path, &output, &["--value-set", "2"]), 0);
+    assert!(said.contains("value set 2 of 2: Gap = 80"), "{said}");
+    assert!((time_of(&said, "cut-in begins") - 5.0).abs() <= 0.011, "{said}");
+    fs::write(&path, values.replace("<Element value=\"60\"/>", "")).unwrap();
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    assert!((time_of(&said, "cut-in begins") - 5.0).abs() <= 0.011, "{said}");
+    fs::remove_file(&output).unwrap();
+    let first = &["--value-set", "1"];
+    let wrong: [(&str, &str, &[&str], &str); 9] = [
+        ("", "", &[], "it has 2 combinations of values: choose one value set from 1 to 2"),
+        ("", "", &["--value-set", "3"], "from 1 to 2"),
+        ("", "", &["--value-set", "0"], "from 1 to 2"),
+        ("\"Gap\"", "\"Gab\"", first, "there is no parameter `Gab`"),
+        ("value=\"60\"", "value=\"wide\"", first, "the double `Gap`: `value` is `wide`"),
+        ("value=\"60\"", "worth=\"60\"", first, "`worth` is no attribute"),
+        ("case.xosc", "cases.xosc", first, "values.xosc:2: `ScenarioFile`: failed to read"),
+        ("case.xosc", "values.xosc", first, "must name a scenario"),
+        ("</OpenSCENARIO>", "<Storyboard/></OpenSCENARIO>", first, "`Storyboard`: a file of values has nothing beside"),
+    ];
+    for (right, wrong, more, word) in wrong {
+        let text = if right.is_empty() { values.to_owned() } else { values.replace(right, wrong) };
+        fs::write(&path, text).unwrap();
+        let refused = imported(&path, &output, more);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{wrong}: {said}");
+        assert!(said.contains(".xosc:") && said.contains(word), "{word}: {said}");
+        assert!(!output.exists(), "{wrong}");
+    }
+    let refused = imported(&folder.path().join("case.xosc"), &output, &["--value-set", "1"]);
+    assert!(message(&refused).contains("no file of values"), "{}", message(&refused));
+}
+
+#[test]
 fn a_distance_that_no_driver_keeps_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");

@@ -11,6 +11,7 @@
 //! error with file, line and element, or a note; nothing is left out in silence.
 
 mod condition;
+mod distribution;
 mod dom;
 mod entities;
 mod follow;
@@ -39,6 +40,7 @@ use self::formula::no_parameter;
 use self::reader::Reader;
 use self::road::{ImportedRoad, UsedRoad};
 use self::storyboard::Storyboard;
+use self::structure::Given;
 use self::world::Vehicle;
 use crate::{ScenarioError, ScenarioFile, Setting};
 
@@ -64,6 +66,9 @@ pub struct ImportOptions {
     pub ego: Option<String>,
     /// Values of parameters that replace the values of the file.
     pub parameters: Vec<(String, String)>,
+    /// Number of the combination of values to use, from 1, of a file that holds values of parameters;
+    /// `None` if it has one combination.
+    pub value_set: Option<u64>,
 }
 
 /// A scenario that was imported.
@@ -119,26 +124,73 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
     let mut root = parse(path, &read_text(path)?)?;
     let reader = Reader { path: path.to_owned() };
     check_kind(&reader, &root)?;
-    if let Some(text) = text_of_closecall(&root) {
-        return of_closecall(&reader, &root, (text, options));
+    if root.child("ParameterValueDistribution").is_some() {
+        structure::check(path, &mut root, &Given::new())?;
+        return of_values(&reader, &root, options);
     }
-    check_options(&reader, &root, options)?;
+    if options.value_set.is_some() {
+        return Err(reader.error(&root, "it is a scenario, and no file of values: it has no value sets").into());
+    }
+    import_scenario(&reader, root, options)
+}
+
+/// Imports the scenario that a file of values names, with one combination of these values.
+fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Imported, ImportFailure> {
+    let distribution = reader.child(root, &["ParameterValueDistribution"])?;
+    let file = distribution::read(reader, root, distribution)?;
+    let count = file.count();
+    let number = match options.value_set {
+        None if count == 1 => 1,
+        Some(number) if (1..=count).contains(&number) => number,
+        _ => {
+            let message = format!("it has {count} combinations of values: choose one value set from 1 to {count}");
+            return Err(reader.error(distribution, message).into());
+        }
+    };
+    let mut values = file.combination(number);
+    values.extend(options.parameters.iter().cloned());
+    let stated: Vec<_> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let note = format!("value set {number} of {count}: {}", stated.join(", "));
+    let scenario = Reader { path: file.scenario };
+    let text = input::read_text(&scenario.path).map_err(|error| {
+        let named = distribution.child("ScenarioFile").unwrap_or(distribution);
+        reader.error(named, format!("failed to read {}: {error}", scenario.path.display()))
+    })?;
+    let scenario_root = parse(&scenario.path, &text)?;
+    check_kind(&scenario, &scenario_root)?;
+    if let Some(inner) = scenario_root.child("ParameterValueDistribution") {
+        return Err(scenario.error(inner, "a file of values must name a scenario, and this is a file of values").into());
+    }
+    let options =
+        ImportOptions { ego: options.ego.clone(), parameters: values.into_iter().collect(), value_set: None };
+    let mut imported = import_scenario(&scenario, scenario_root, &options)?;
+    imported.notes.insert(0, note);
+    Ok(imported)
+}
+
+/// Imports a document that is a scenario.
+fn import_scenario(reader: &Reader, mut root: Node, options: &ImportOptions) -> Result<Imported, ImportFailure> {
+    let path = &reader.path;
+    if let Some(text) = text_of_closecall(&root) {
+        return of_closecall(reader, &root, (text, options));
+    }
+    check_options(reader, &root, options)?;
     let mut notes = structure::check(path, &mut root, &options.parameters.iter().cloned().collect())?;
-    let Entities { vehicles, controlled, notes: of_entities } = entities::read(&reader, &root)?;
+    let Entities { vehicles, controlled, notes: of_entities } = entities::read(reader, &root)?;
     notes.extend(of_entities);
-    let ego = ego_of(&reader, &root, (&vehicles, &controlled), options.ego.as_deref())?;
+    let ego = ego_of(reader, &root, (&vehicles, &controlled), options.ego.as_deref())?;
     let storyboard = reader.child(&root, &["Storyboard"])?;
-    let road = road_of(&reader, &root, storyboard)?;
+    let road = road_of(reader, &root, storyboard)?;
     let mut played = Storyboard::new(reader.clone(), &road, vehicles, ego);
     played.notes = notes;
     played.notes.extend(road.notes.iter().map(|note| format!("the road has {note}")));
     let globals = played.init(storyboard)?;
     let starts = played.vehicles.clone();
     played.play(storyboard)?;
-    let environment = environment(&reader, &globals, &mut played.notes)?;
+    let environment = environment(reader, &globals, &mut played.notes)?;
     let text = scenario_text(path, &mut played, (&starts, &environment))?;
     let parsed = ScenarioFile::parse(path, &text, &[]).and_then(|file| file.check());
-    parsed.map_err(|source| at_element(&reader, (&root, &starts), source))?;
+    parsed.map_err(|source| at_element(reader, (&root, &starts), source))?;
     Ok(Imported { text, notes: played.notes, events: played.events })
 }
 
@@ -184,12 +236,6 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
     if version.0 != "1" || !["0", "1", "2", "3"].contains(&version.1.as_str()) {
         let message = format!("version {}.{}: the versions 1.0 to 1.3 are read", version.0, version.1);
         return Err(reader.error(header, message));
-    }
-    if let Some(distribution) = root.child("ParameterValueDistribution") {
-        let scenario = distribution.child("ScenarioFile").and_then(|file| file.raw("filepath")).unwrap_or_default();
-        let message =
-            format!("it holds values only: import the scenario that it names, `{scenario}`, and give each value");
-        return Err(reader.error(distribution, message));
     }
     match root.child("Catalog") {
         Some(catalog) => Err(reader.error(catalog, "a catalogue is no scenario")),

@@ -266,7 +266,7 @@ const STORYBOARD_ELEMENT_STATE: [&str; 7] = [
 ];
 const STORYBOARD_ELEMENT_TYPE: [&str; 6] = ["act", "action", "event", "maneuver", "maneuverGroup", "story"];
 
-static ELEMENTS: [Element; 122] = [
+static ELEMENTS: [Element; 133] = [
     element(
         "OpenSCENARIO",
         &[],
@@ -279,6 +279,7 @@ static ELEMENTS: [Element; 122] = [
             "RoadNetwork",
             "Entities",
             "Storyboard",
+            "ParameterValueDistribution",
         ],
     ),
     element(
@@ -704,6 +705,25 @@ static ELEMENTS: [Element; 122] = [
         ],
         &[],
     ),
+    element("ParameterValueDistribution", &[], &["ScenarioFile", "Deterministic", "Stochastic"]),
+    element("ScenarioFile", &[text("filepath")], &[]),
+    element(
+        "Deterministic",
+        &[],
+        &["DeterministicMultiParameterDistribution*", "DeterministicSingleParameterDistribution*"],
+    ),
+    element("DeterministicMultiParameterDistribution", &[], &["ValueSetDistribution"]),
+    element("ValueSetDistribution", &[], &["ParameterValueSet*"]),
+    element("ParameterValueSet", &[], &["ParameterAssignment*"]),
+    element(
+        "DeterministicSingleParameterDistribution",
+        &[text("parameterName")],
+        &["DistributionSet", "DistributionRange", "UserDefinedDistribution"],
+    ),
+    element("DistributionSet", &[], &["Element*"]),
+    element("Element", &[text("value")], &[]),
+    element("DistributionRange", &[number("stepWidth")], &["Range"]),
+    element("Range", &[number("lowerLimit"), number("upperLimit")], &[]),
     ignored("License"),
     ignored("Properties"),
     noted("VariableDeclarations", "a scenario has no variables"),
