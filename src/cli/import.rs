@@ -48,11 +48,8 @@ fn parameter(text: &str) -> Result<(String, String), String> {
 
 pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
     protect(std::slice::from_ref(&args.file), &[("--out", Some(&args.output))])?;
-    let options = ImportOptions {
-        ego: args.ego.clone(),
-        parameters: args.parameters.clone(),
-        value_set: args.value_set,
-    };
+    let options =
+        ImportOptions { ego: args.ego.clone(), parameters: args.parameters.clone(), value_set: args.value_set };
     let imported = import(&args.file, &options)?;
     write_file(&args.output, |file| write!(file, "# Made by `{}`\n{}", command_line(), imported.text))?;
     print_written(&args.output);

@@ -411,6 +411,8 @@ fn faults_of_attributes() -> Vec<(&'static str, &'static str, &'static [&'static
         ("value=\"$Headway\"", "value=\"-1\"", &["`TimeHeadwayCondition`", "`value` is `-1`", "at least 0"]),
         ("delay=\"0.5\"", "delay=\"-5\"", &["`Condition`", "`delay` is `-5`", "at least 0"]),
         ("conditionEdge=\"none\"", "conditionEdge=\"$Gap\"", &["`Condition`", "`60`", "falling, none, rising"]),
+        ("<EntityRef entityRef=\"Slow_Truck\"/>", "", &["`PrivateAction`", "`Actors` has no `EntityRef`"]),
+        ("<EntityRef entityRef=\"Ego\"/>", "", &["`TriggeringEntities`", "it needs an `EntityRef`"]),
         ("triggeringEntitiesRule=\"any\"", "triggeringEntitiesRule=\"some\"", &["TriggeringEntities", "all, any"]),
         ("selectTriggeringEntities=\"false\"", "selectTriggeringEntities=\"true\"", &["`Actors`", "not read"]),
         ("storyboardElementType=\"event\"", "storyboardElementType=\"act\"", &["there is no act `cut-in`"]),

@@ -19,6 +19,9 @@ impl Storyboard<'_> {
         let mut is_any = false;
         for group in trigger.all("ConditionGroup") {
             let mut are_all = true;
+            if group.children.is_empty() {
+                return Err(self.reader.error(group, "it needs a `Condition`"));
+            }
             for condition in group.all("Condition") {
                 // Each is evaluated in each step, for its edge.
                 are_all &= self.holds(condition)?;
@@ -64,6 +67,9 @@ impl Storyboard<'_> {
                 let mut values = Vec::new();
                 for entity in entities.all("EntityRef") {
                     values.push(self.by_entity(self.vehicle(entity, "entityRef")?, condition)?);
+                }
+                if values.is_empty() {
+                    return Err(reader.error(entities, "it needs an `EntityRef`"));
                 }
                 match rule.as_str() {
                     "any" => Ok(values.contains(&true)),

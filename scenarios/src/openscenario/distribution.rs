@@ -98,9 +98,7 @@ fn values(reader: &Reader, node: &Node) -> Result<Vec<Given>, ImportError> {
     let inner = reader.only(node)?;
     let given = |value: String| Given::from([(name.clone(), value)]);
     match inner.name.as_str() {
-        "DistributionSet" => {
-            inner.all("Element").map(|element| reader.text(element, "value").map(&given)).collect()
-        }
+        "DistributionSet" => inner.all("Element").map(|element| reader.text(element, "value").map(&given)).collect(),
         "DistributionRange" => {
             let range = reader.child(inner, &["Range"])?;
             let (low, high) = (reader.number(range, "lowerLimit")?, reader.number(range, "upperLimit")?);

@@ -159,10 +159,11 @@ fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Im
     let scenario_root = parse(&scenario.path, &text)?;
     check_kind(&scenario, &scenario_root)?;
     if let Some(inner) = scenario_root.child("ParameterValueDistribution") {
-        return Err(scenario.error(inner, "a file of values must name a scenario, and this is a file of values").into());
+        return Err(scenario
+            .error(inner, "a file of values must name a scenario, and this is a file of values")
+            .into());
     }
-    let options =
-        ImportOptions { ego: options.ego.clone(), parameters: values.into_iter().collect(), value_set: None };
+    let options = ImportOptions { ego: options.ego.clone(), parameters: values.into_iter().collect(), value_set: None };
     let mut imported = import_scenario(&scenario, scenario_root, &options)?;
     imported.notes.insert(0, note);
     Ok(imported)

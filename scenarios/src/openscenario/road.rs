@@ -174,12 +174,7 @@ fn reference_line(path: &Path, road: &Node, curvature_per_m: f64) -> Option<Refe
         _ => false,
     };
     let value = |name| number(path, first, name).ok();
-    is_one.then_some(ReferenceLine {
-        x_m: value("x")?,
-        y_m: value("y")?,
-        heading_rad: value("hdg")?,
-        curvature_per_m,
-    })
+    is_one.then_some(ReferenceLine { x_m: value("x")?, y_m: value("y")?, heading_rad: value("hdg")?, curvature_per_m })
 }
 
 /// Checks that a road can exist: its lengths and its curvatures.

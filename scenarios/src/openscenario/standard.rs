@@ -72,7 +72,10 @@ enum Kind {
     Once,
     Boolean,
     /// One of the words of the standard, and the words of it that are read.
-    Word { standard: &'static [&'static str], read: &'static [&'static str] },
+    Word {
+        standard: &'static [&'static str],
+        read: &'static [&'static str],
+    },
 }
 
 impl Attribute {

@@ -292,6 +292,9 @@ impl<'a> Storyboard<'a> {
             if inner.name != "PrivateAction" {
                 return Err(self.reader.error(inner, "only actions of vehicles are read"));
             }
+            if actors.is_empty() {
+                return Err(self.reader.error(inner, "no vehicle performs it: `Actors` has no `EntityRef`"));
+            }
             for &actor in actors {
                 self.action(self.reader.only(inner)?.clone(), actor, &mut running)?;
             }

@@ -163,9 +163,8 @@ impl Checker<'_> {
             .iter()
             .map(|group| {
                 let constraints = group.children.iter();
-                let stated = constraints.map(|constraint| {
-                    format!("{} {}", attribute(constraint, "rule"), attribute(constraint, "value"))
-                });
+                let stated = constraints
+                    .map(|constraint| format!("{} {}", attribute(constraint, "rule"), attribute(constraint, "value")));
                 stated.collect::<Vec<_>>().join(" and ")
             })
             .collect();
