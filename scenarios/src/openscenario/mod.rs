@@ -543,12 +543,13 @@ fn scenario_text(
     let _ = write!(
         text,
         "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
-         road = {{ lanes = {}, lane-width-m = {:?}, curvature-per-m = {:?}{} }}\n",
+         road = {{ lanes = {}, lane-width-m = {:?}, curvature-per-m = {:?}{}{} }}\n",
         kebab(&stem),
         road.lanes.len(),
         road.lane_width_m,
         road.curvature_per_m,
         limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),
+        if road.is_left_hand { ", overtaking-side = \"right\"" } else { "" },
     );
     if !environment.is_empty() {
         let _ = writeln!(text, "environment = {{ {environment} }}");

@@ -20,7 +20,9 @@ const MOST_CURVATURE_PER_M: f64 = 0.2;
 #[derive(Clone, Debug)]
 pub(super) struct ImportedRoad {
     pub(super) id: String,
-    /// The lanes of OpenDRIVE on the right of the reference line, from the left.
+    /// Whether traffic keeps left, so that its lanes are on the left of the reference line.
+    pub(super) is_left_hand: bool,
+    /// The lanes of OpenDRIVE on which traffic drives along the reference line, from the left.
     pub(super) lanes: Vec<i32>,
     /// The centres of these lanes, to the left of the reference line (m).
     pub(super) centres_m: Vec<f64>,
@@ -78,9 +80,12 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
     if lanes.all("laneSection").count() > 1 {
         notes.push("lanes that begin or end: the lanes are those of the first section".to_owned());
     }
-    let right = section.child("right").ok_or_else(|| section.error(path, "it has no lanes on the right"))?;
+    // With left-hand traffic, the lanes along the road are those on the left.
+    let is_left_hand = road.raw("rule") == Some("LHT");
+    let side = if is_left_hand { "left" } else { "right" };
+    let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
     let mut driving: Vec<(i32, f64)> = Vec::new();
-    for node in right.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
+    for node in along.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
         let id = number(path, node, "id")?;
         let (width_m, width) = match node.child("width") {
             Some(width) => (number(path, width, "a")?, width),
@@ -111,11 +116,11 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
         let lanes: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
         let message = match used {
             UsedRoad::Lane { lane, .. } => {
-                format!("lane {lane} is no driving lane on the right of road {road_id}, only {}", lanes.join(", "))
+                format!("lane {lane} is no driving lane on the {side} of road {road_id}, only {}", lanes.join(", "))
             }
             UsedRoad::Only => "none of its lanes is a driving lane with a width of 2.5 to 5 m".to_owned(),
         };
-        return Err(right.error(path, message));
+        return Err(along.error(path, message));
     };
     if driving.iter().any(|(_, width)| *width != lane_width_m) {
         notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
@@ -134,30 +139,35 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
         }
         None => None,
     };
-    let centres_m = centres_m(lanes, right, &driving);
+    let centres_m = centres_m(lanes, along, &driving);
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
     let line = reference_line(path, road, curvature_per_m);
     let id = road_id.to_owned();
-    Ok(ImportedRoad { id, lanes, centres_m, lane_width_m, curvature_per_m, line, speed_limit_mps, notes })
+    Ok(ImportedRoad { id, is_left_hand, lanes, centres_m, lane_width_m, curvature_per_m, line, speed_limit_mps, notes })
 }
 
-/// Returns the centres of driving lanes to the left of the reference line (m).
-fn centres_m(lanes: &Node, right: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
+/// Returns the centres of driving lanes to the left of the reference line (m), from the left. `along`
+/// holds the lanes of one side.
+fn centres_m(lanes: &Node, along: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
     let value = |node: &Node, name: &str| node.raw(name).and_then(|text| text.trim().parse::<f64>().ok());
     let width_m = |lane: &Node| lane.child("width").and_then(|width| value(width, "a")).unwrap_or(0.0);
     #[expect(clippy::cast_possible_truncation, reason = "as the lanes that they are compared with")]
     let of_lane = |lane: &Node| Some((value(lane, "id")? as i32, width_m(lane)));
-    let mut widths: Vec<(i32, f64)> = right.all("lane").filter_map(of_lane).collect();
-    widths.sort_by_key(|lane| std::cmp::Reverse(lane.0));
-    let mut left_m = lanes.child("laneOffset").and_then(|offset| value(offset, "a")).unwrap_or(0.0);
+    let mut widths: Vec<(i32, f64)> = along.all("lane").filter_map(of_lane).collect();
+    // From the reference line outwards.
+    widths.sort_by_key(|lane| lane.0.unsigned_abs());
+    let mut from_m = lanes.child("laneOffset").and_then(|offset| value(offset, "a")).unwrap_or(0.0);
     let mut centres_m = Vec::new();
     for (id, width_m) in widths {
+        let to_m = from_m + width_m * f64::from(id.signum());
         if driving.iter().any(|(other, _)| *other == id) {
-            centres_m.push(left_m - 0.5 * width_m);
+            centres_m.push((id, 0.5 * (from_m + to_m)));
         }
-        left_m -= width_m;
+        from_m = to_m;
     }
-    centres_m
+    centres_m.sort_by_key(|lane| std::cmp::Reverse(lane.0));
+    centres_m.dedup_by_key(|lane| lane.0);
+    centres_m.into_iter().map(|(_, centre_m)| centre_m).collect()
 }
 
 /// Returns the reference line of a road in the plane, or `None` if it is neither one line nor one arc,
@@ -225,5 +235,36 @@ fn number(path: &Path, node: &Node, name: &str) -> Result<f64, ImportError> {
     match text.trim().parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(number),
         _ => Err(node.error(path, format!("`{name}` is `{text}`; a number is needed"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn road(rule: &str, side: &str, sign: &str) -> Result<ImportedRoad, String> {
+        let lane = |number: u32, kind: &str, width_m: f64| {
+            format!("<lane id=\"{sign}{number}\" type=\"{kind}\"><width a=\"{width_m}\"/></lane>")
+        };
+        let lanes = [lane(1, "median", 2.0), lane(2, "driving", 3.5), lane(3, "driving", 3.5)].concat();
+        let text = format!(
+            "<OpenDRIVE><road id=\"7\" length=\"900\" rule=\"{rule}\"><planView><geometry x=\"0\" y=\"0\" hdg=\"0\" \
+             length=\"900\"><line/></geometry></planView><lanes><laneOffset a=\"1\"/><laneSection><{side}>{lanes}</{side}>\
+             </laneSection></lanes></road></OpenDRIVE>"
+        );
+        read(Path::new("road.xodr"), &text, &UsedRoad::Only).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_lanes_of_each_rule_are_those_along_the_road_from_the_left() {
+        let right = road("RHT", "right", "-").unwrap();
+        assert_eq!(
+            (right.is_left_hand, &right.lanes[..], &right.centres_m[..]),
+            (false, &[-2, -3][..], &[-2.75, -6.25][..])
+        );
+        let left = road("LHT", "left", "").unwrap();
+        assert_eq!((left.is_left_hand, &left.lanes[..], &left.centres_m[..]), (true, &[3, 2][..], &[8.25, 4.75][..]));
+        assert!(road("RHT", "left", "").unwrap_err().contains("no lanes on the right"));
+        assert!(road("LHT", "right", "-").unwrap_err().contains("no lanes on the left"));
     }
 }

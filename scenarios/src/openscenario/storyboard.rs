@@ -510,7 +510,7 @@ impl<'a> Storyboard<'a> {
             [from, to].map(|lane| self.road.lanes.iter().position(|candidate| *candidate == lane));
         let Some((from_index, to_index)) = from_index.zip(to_index) else {
             let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
-            let message = format!("lane {to} is no driving lane on the right of the road, only {}", lanes.join(", "));
+            let message = format!("lane {to} is no driving lane along the road, only {}", lanes.join(", "));
             return Err(self.reader.error(target, message));
         };
         if from_index == to_index {
@@ -536,7 +536,11 @@ impl<'a> Storyboard<'a> {
     /// out 0.
     pub(super) fn shifted(&self, lane: i32, shift: i32) -> i32 {
         let sum = lane.saturating_add(shift);
-        if lane < 0 && sum >= 0 { sum + 1 } else { sum }
+        match lane < 0 {
+            true if sum >= 0 => sum.saturating_add(1),
+            false if sum <= 0 => sum.saturating_sub(1),
+            _ => sum,
+        }
     }
 
     fn advance(&mut self) {
@@ -803,7 +807,7 @@ impl<'a> Storyboard<'a> {
         };
         if !self.road.lanes.contains(&lane) {
             let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
-            let message = format!("lane {lane} is no driving lane on the right of the road, only {}", lanes.join(", "));
+            let message = format!("lane {lane} is no driving lane along the road, only {}", lanes.join(", "));
             // The other vehicle may not be placed yet.
             let is_relative = !matches!(node.name.as_str(), "LanePosition" | "WorldPosition");
             return if round == 0 && is_relative { Ok(()) } else { Err(reader.error(node, message)) };

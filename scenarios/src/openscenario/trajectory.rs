@@ -131,7 +131,7 @@ impl Storyboard<'_> {
                 let (s_m, lane) = self.on_lane(position)?;
                 let index = self.road.lanes.iter().position(|candidate| *candidate == lane);
                 let Some(centre_m) = index.and_then(|index| self.road.centres_m.get(index)) else {
-                    let message = format!("lane {lane} is no driving lane on the right of the road");
+                    let message = format!("lane {lane} is no driving lane along the road");
                     return Err(reader.error(position, message));
                 };
                 Ok(RoadPoint { s_m, t_m: centre_m + reader.number_or(position, "offset", 0.0)? })
