@@ -627,6 +627,30 @@ fn each_scenario_of_others_is_imported_and_runs_or_is_refused_by_name() {
 }
 
 #[test]
+fn a_combination_of_a_variation_file_that_breaks_the_constraints_of_its_scenario_is_refused() {
+    let Some(data) = closecall_testing::data() else { return };
+    let path = data.join("osc_alks/alks_scenario_4_4_1_cut_in_no_collision_variation.xosc");
+    if !path.is_file() {
+        closecall_testing::skip(closecall_testing::Need::Data, "CLOSECALL_DATA has no osc_alks");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // At 20 km/h, a vehicle that is 50 km/h slower would drive backwards.
+    let cases: [(&[&str], &str); 2] = [
+        (&[], "it has 52500 combinations of values: choose one value set from 1 to 52500"),
+        (&["--value-set", "1"], "its constraints are"),
+    ];
+    for (more, word) in cases {
+        let refused = imported(&path, &output, more);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{said}");
+        assert!(said.contains(".xosc:") && said.contains(word), "{said}");
+        assert!(!output.exists());
+    }
+}
+
+#[test]
 fn the_events_of_a_cut_in_are_those_of_esmini_within_a_step() {
     let Some(data) = closecall_testing::data() else { return };
     let path = data.join("esmini_openx/xosc/cut-in.xosc");
