@@ -23,6 +23,8 @@ const BEGUN: f64 = 0.1;
 /// assumption; 0.1 to 2 are plausible.
 const MOST_APART_M: f64 = 1.0;
 
+/// Largest distance from the centre of the nearest lane (m): half the widest lane of a scenario file.
+const MOST_BESIDE_M: f64 = 2.5;
 /// Speed at which a vehicle stands (m/s): numerical.
 const STANDING_MPS: f64 = 1e-6;
 
@@ -192,7 +194,11 @@ fn speeds(points: &[Point]) -> Result<Vec<(f64, f64)>, String> {
 
 /// Returns the lane changes of a trajectory.
 fn changes(points: &[Point], centres_m: &[f64]) -> Result<Vec<Change>, String> {
-    let lane_of = |point: &Point| nearest(centres_m, point.on_road.t_m).ok_or("the road has no lanes".to_owned());
+    let lane_of = |point: &Point| {
+        let lane = nearest(centres_m, point.on_road.t_m);
+        let lane = lane.filter(|lane| (centres_m[*lane] - point.on_road.t_m).abs() <= MOST_BESIDE_M);
+        lane.ok_or_else(|| format!("at {:.2} s it leaves the lanes of the road", point.at_s))
+    };
     let mut changes = Vec::new();
     let Some(first) = points.first() else { return Ok(changes) };
     let mut from = lane_of(first)?;
@@ -273,5 +279,7 @@ mod tests {
         assert!(changes(&broken_off, &[-1.75, -5.25]).unwrap_err().contains("does not reach the next lane"));
         let jump = [point(0.0, 0.0, -1.75), point(1.0, 30.0, -8.75)];
         assert!(changes(&jump, &[-1.75, -5.25, -8.75]).unwrap_err().contains("more than one lane"));
+        let off_road = [point(0.0, 0.0, -1.75), point(1.0, 30.0, 4.0)];
+        assert!(changes(&off_road, &[-1.75, -5.25]).unwrap_err().contains("leaves the lanes"));
     }
 }
