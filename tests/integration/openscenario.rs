@@ -168,8 +168,8 @@ fn the_open_loop_that_closecall_exports_is_imported_with_its_speeds() {
     json(&closecall(run), 0);
 }
 
-/// Returns the scenario with a trajectory in place of the lane change, through points with time (s),
-/// lane and position (m).
+/// Returns the scenario with a trajectory in place of the lane change, through points with time
+/// (s), lane and position (m).
 fn with_trajectory(attributes: &str, points: &[(f64, i32, f64)]) -> String {
     let start = SCENARIO.find("<LateralAction>").unwrap();
     let end = SCENARIO.find("</LateralAction>").unwrap() + "</LateralAction>".len();

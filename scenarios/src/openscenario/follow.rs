@@ -1,9 +1,10 @@
 //! A vehicle that keeps a gap to another: `LongitudinalDistanceAction` during a run.
 //!
-//! `tool export` writes this action for a human driver who follows. The import makes such a driver of
-//! it: Wiedemann 99, whose gap of equilibrium cc0 + cc1·v + cc2/2 is the gap of the action at the
-//! speed v of the vehicle ahead. While the storyboard is played, the follower comes to its gap within
-//! the limits of the action. That motion decides only when triggers fire that look at the follower.
+//! `tool export` writes this action for a human driver who follows. The import makes such a driver
+//! of it: Wiedemann 99, whose gap of equilibrium cc0 + cc1·v + cc2/2 is the gap of the action at
+//! the speed v of the vehicle ahead. While the storyboard is played, the follower comes to its gap
+//! within the limits of the action. That motion decides only when triggers fire that look at the
+//! follower.
 
 use super::dom::{ImportError, Node};
 use super::reader::is_true;
@@ -26,7 +27,8 @@ pub(super) struct Following {
     pub(super) vehicle: usize,
     lead: usize,
     pub(super) line: usize,
-    /// The gap between the bumpers is this distance (m) and this time (s) at the speed of the follower.
+    /// The gap between the bumpers is this distance (m) and this time (s) at the speed of the
+    /// follower.
     gap_m: f64,
     gap_s: f64,
     max_acceleration_mps2: f64,

@@ -66,8 +66,8 @@ pub struct ImportOptions {
     pub ego: Option<String>,
     /// Values of parameters that replace the values of the file.
     pub parameters: Vec<(String, String)>,
-    /// Number of the combination of values to use, from 1, of a file that holds values of parameters;
-    /// `None` if it has one combination.
+    /// Number of the combination of values to use, from 1, of a file that holds values of
+    /// parameters; `None` if it has one combination.
     pub value_set: Option<u64>,
 }
 

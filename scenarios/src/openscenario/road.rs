@@ -146,8 +146,8 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
     Ok(ImportedRoad { id, is_left_hand, lanes, centres_m, lane_width_m, curvature_per_m, line, speed_limit_mps, notes })
 }
 
-/// Returns the centres of driving lanes to the left of the reference line (m), from the left. `along`
-/// holds the lanes of one side.
+/// Returns the centres of driving lanes to the left of the reference line (m), from the left.
+/// `along` holds the lanes of one side.
 fn centres_m(lanes: &Node, along: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
     let value = |node: &Node, name: &str| node.raw(name).and_then(|text| text.trim().parse::<f64>().ok());
     let width_m = |lane: &Node| lane.child("width").and_then(|width| value(width, "a")).unwrap_or(0.0);
@@ -170,8 +170,8 @@ fn centres_m(lanes: &Node, along: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
     centres_m.into_iter().map(|(_, centre_m)| centre_m).collect()
 }
 
-/// Returns the reference line of a road in the plane, or `None` if it is neither one line nor one arc,
-/// or the file does not say where it begins.
+/// Returns the reference line of a road in the plane, or `None` if it is neither one line nor one
+/// arc, or the file does not say where it begins.
 fn reference_line(path: &Path, road: &Node, curvature_per_m: f64) -> Option<ReferenceLine> {
     let geometries: Vec<&Node> = road.child("planView")?.all("geometry").collect();
     let first = geometries.first()?;

@@ -1,10 +1,10 @@
 //! The elements of ASAM OpenSCENARIO XML that the import reads: their attributes with the values
 //! that are allowed, and the elements that may stand inside.
 //!
-//! The table is the union of the schemas 1.0.0, 1.1.1, 1.2.0 and 1.3.0 of ASAM (`OpenSCENARIO.xsd`),
-//! so that a file of each version is read. It differs from them in three places: a range is stated
-//! where the text of the standard has one, a lane is an integer, and of some enumerations only a
-//! part is read ([`some`]).
+//! The table is the union of the schemas 1.0.0, 1.1.1, 1.2.0 and 1.3.0 of ASAM
+//! (`OpenSCENARIO.xsd`), so that a file of each version is read. It differs from them in three
+//! places: a range is stated where the text of the standard has one, a lane is an integer, and of
+//! some enumerations only a part is read ([`some`]).
 //!
 //! An attribute of the table that nothing reads has no meaning for a scenario of parallel lanes:
 //!
@@ -79,8 +79,8 @@ enum Kind {
 }
 
 impl Attribute {
-    /// Returns the value of a text with its parameters replaced: a number in Rust's notation, a word
-    /// as it is.
+    /// Returns the value of a text with its parameters replaced: a number in Rust's notation, a
+    /// word as it is.
     ///
     /// # Errors
     /// The message, which names the attribute and says which values are allowed.

@@ -22,12 +22,13 @@ pub(super) type Given = BTreeMap<String, String>;
 
 static NOTHING_GIVEN: Given = Given::new();
 
-/// Replaces each attribute of an element, and of all inside it, by its value. `given` replaces values
-/// of the parameters that the element itself declares. Returns notes on elements that are left out.
+/// Replaces each attribute of an element, and of all inside it, by its value. `given` replaces
+/// values of the parameters that the element itself declares. Returns notes on elements that are
+/// left out.
 ///
 /// # Errors
-/// [`ImportError`] at the first element or attribute that the standard does not have there, or whose
-/// value it does not allow.
+/// [`ImportError`] at the first element or attribute that the standard does not have there, or
+/// whose value it does not allow.
 pub(super) fn check(path: &Path, root: &mut Node, given: &Given) -> Result<Vec<String>, ImportError> {
     let mut checker = Checker { path, notes: Vec::new() };
     checker.element(root, &Values::default(), given)?;
@@ -103,7 +104,8 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// Returns the values inside an element that declares parameters, or `None` if it declares none.
+    /// Returns the values inside an element that declares parameters, or `None` if it declares
+    /// none.
     fn declared<'v>(
         &mut self,
         node: &mut Node,

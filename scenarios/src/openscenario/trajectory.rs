@@ -5,9 +5,9 @@
 //!                                                └─▶ nearest lane of each ─▶ lane changes
 //! ```
 //!
-//! A vehicle of a scenario keeps the centre of its lane, and changes lanes on a path of its own. The
-//! lane change that stands for a part of the trajectory passes 10 % and 90 % of the way between the
-//! two centres in the same time.
+//! A vehicle of a scenario keeps the centre of its lane, and changes lanes on a path of its own.
+//! The lane change that stands for a part of the trajectory passes 10 % and 90 % of the way between
+//! the two centres in the same time.
 
 use super::dom::{ImportError, Node};
 use super::plane::RoadPoint;
@@ -23,7 +23,8 @@ const BEGUN: f64 = 0.1;
 /// assumption; 0.1 to 2 are plausible.
 const MOST_APART_M: f64 = 1.0;
 
-/// Largest distance from the centre of the nearest lane (m): half the widest lane of a scenario file.
+/// Largest distance from the centre of the nearest lane (m): half the widest lane of a scenario
+/// file.
 const MOST_BESIDE_M: f64 = 2.5;
 /// Speed at which a vehicle stands (m/s): numerical.
 const STANDING_MPS: f64 = 1e-6;
@@ -57,8 +58,8 @@ impl Storyboard<'_> {
     /// Returns what a vehicle does that follows a trajectory from now.
     ///
     /// # Errors
-    /// [`ImportError`] if the trajectory is no line through points with times, does not begin at the
-    /// vehicle, or leaves the lanes of the road.
+    /// [`ImportError`] if the trajectory is no line through points with times, does not begin at
+    /// the vehicle, or leaves the lanes of the road.
     pub(super) fn trajectory(&self, node: &Node, vehicle: usize) -> Result<Driven, ImportError> {
         let reader = &self.reader;
         if reader.number_or(node, "initialDistanceOffset", 0.0)? != 0.0 {
