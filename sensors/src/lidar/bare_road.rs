@@ -25,7 +25,7 @@ use super::noise::MAX_NORMAL;
 use super::pattern::{CentreLines, Column, Elevation, LineBounds, ROAD_LAYERS};
 use super::power::{LinkBudget, MIN_POWER};
 use super::receiver::SensorPoseEstimate;
-use super::targets::{FaceRange, Targets};
+use super::targets::{FaceRange, LayerMask, Targets};
 use closecall_traffic::maths;
 
 /// The faces of the road's surface, which is always the first of all faces.
@@ -215,7 +215,7 @@ pub(crate) fn cast_ground<S: Simd>(
     simd: S,
     (column, elevations): (&Column, &[Elevation]),
     (targets, road): (&Targets, &Road),
-    (omitted, wanted): (Option<&BareRoad>, u64),
+    (omitted, wanted): (Option<&BareRoad>, LayerMask),
     hits: &mut ColumnHits,
 ) {
     for (layer, elevation) in elevations.iter().enumerate() {

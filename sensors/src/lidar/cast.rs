@@ -11,7 +11,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 
 use super::pattern::{Column, Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
-use super::targets::{FaceRange, Part, Targets, layers_below};
+use super::targets::{FaceRange, LayerMask, Part, Targets, layers_below};
 
 /// The face index of a sub-ray that hits nothing.
 pub(crate) const NO_FACE: u32 = u32::MAX;
@@ -36,11 +36,11 @@ pub(crate) struct ColumnHits {
     /// First hits of the beam of each layer.
     pub(crate) beams: Vec<BeamHits>,
     /// Bit mask of the layers that were tested against at least one solid.
-    pub(crate) tested: u64,
+    pub(crate) tested: LayerMask,
     /// Number of layers, counted from the lowest, that may receive a return from the road.
     pub(crate) ground_below: usize,
     /// Bit mask of those layers whose returns from the bare road are left out.
-    pub(crate) bare: u64,
+    pub(crate) bare: LayerMask,
 }
 
 impl ColumnHits {
@@ -66,7 +66,7 @@ impl ColumnHits {
 
     /// Returns a bit mask of the layers that may receive a return from a solid or from the road
     /// that must not be left out.
-    pub(crate) fn need_echoes(&self) -> u64 {
+    pub(crate) fn need_echoes(&self) -> LayerMask {
         self.tested | layers_below(self.ground_below) & !self.bare
     }
 
@@ -77,7 +77,7 @@ impl ColumnHits {
         &mut self,
         simd: S,
         (column, elevations): (&Column, &[Elevation]),
-        (part, wanted): (&Part, u64),
+        (part, wanted): (&Part, LayerMask),
         targets: &Targets,
     ) {
         let mut layers = part.layers & wanted;
@@ -179,7 +179,7 @@ pub(crate) struct ActiveParts {
     /// Column from which on other parts are active.
     change: usize,
     /// Bit mask of the layers that may hit an active part that is none of a guard rail.
-    solid_layers: u64,
+    solid_layers: LayerMask,
     /// Whether an active part is one of a guard rail.
     has_rails: bool,
 }
@@ -201,7 +201,7 @@ impl ActiveParts {
     }
 
     /// Returns a bit mask of the layers that may hit an active part that is none of a guard rail.
-    pub(crate) fn solid_layers(&self) -> u64 {
+    pub(crate) fn solid_layers(&self) -> LayerMask {
         self.solid_layers
     }
 
@@ -245,7 +245,7 @@ pub(crate) fn by_brute_force(column: &Column, elevations: &[Elevation], targets:
     let mut hits = ColumnHits::new(elevations.len());
     for part in &targets.parts {
         let part = Part { columns: 0..usize::MAX, layers: layers_below(elevations.len()), ..*part };
-        let part_and_mask = (&part, u64::MAX);
+        let part_and_mask = (&part, LayerMask::MAX);
         fearless_simd::dispatch!(fearless_simd::Level::baseline(), simd => hits.cast(simd, (column, elevations), part_and_mask, targets));
     }
     hits

@@ -31,7 +31,7 @@ const USUAL_POWER: f64 = 2.25;
 /// Decimals to which that standard deviation is rounded, as a factor.
 const SD_DECIMALS: f64 = 1e4;
 /// Greatest number of layers.
-pub(super) const MAX_LAYERS: usize = 64;
+pub(super) const MAX_LAYERS: usize = 128;
 /// Greatest elevation of a layer (°).
 const MAX_ELEVATION_DEG: f64 = 45.0;
 /// Greatest number of beams in a scan: beams are numbered with 16 bits.
@@ -55,7 +55,7 @@ pub struct LidarKindConfig {
     pub name: String,
     /// Where the numbers are published.
     pub source: String,
-    /// Elevations of the layers at azimuth 0, without the mirror's contribution (deg): 1 to 64,
+    /// Elevations of the layers at azimuth 0, without the mirror's contribution (deg): 1 to 128,
     /// from the lowest to the highest.
     pub layers_deg: Vec<f64>,
     /// Number of successive layers that share an azimuth shift: a divisor of the number of layers,
@@ -253,7 +253,7 @@ impl LidarKindConfig {
         let layers = self.layers_deg.len();
         let count = |value: usize, allowed| Problem::WrongCount { value: value as u64, allowed };
         if !(1..=MAX_LAYERS).contains(&layers) {
-            return Err(ConfigError::new("layers-deg", count(layers, "a list of 1 to 64 elevations")));
+            return Err(ConfigError::new("layers-deg", count(layers, "a list of 1 to 128 elevations")));
         }
         for (index, pair) in self.layers_deg.windows(2).enumerate() {
             if !(pair[0] < pair[1]) {

@@ -13,7 +13,7 @@ use super::noise::{Noise, Purpose};
 use super::pattern::{Column, Elevation};
 use super::power::MIN_POWER;
 use super::soft::{self, Air, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
-use super::targets::Targets;
+use super::targets::{LayerMask, Targets};
 use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
@@ -170,7 +170,7 @@ impl Receiver<'_> {
     pub(crate) fn receive<S: Simd>(
         &self,
         simd: S,
-        (hits, droplets, layers): (&ColumnHits, &ColumnDroplets, u64),
+        (hits, droplets, layers): (&ColumnHits, &ColumnDroplets, LayerMask),
         (scan, truth): (&mut LidarScan, &mut ScanTruth),
     ) {
         let in_air = !self.plumes.is_empty() || self.air.link.has_fog();
@@ -211,7 +211,7 @@ impl Receiver<'_> {
     /// Returns two numbers of beams, of the layers in a bit mask: the beams on which droplets may
     /// give a detectable return, and the beams that the model examines closely.
     #[cfg(test)]
-    pub(crate) fn droplet_returns(&self, looked_at: u64) -> [usize; 2] {
+    pub(crate) fn droplet_returns(&self, looked_at: LayerMask) -> [usize; 2] {
         let mut counts = [0; 2];
         for layer in 0..self.elevations.len() {
             let is_found = self.droplet_effect(layer).is_detectable();

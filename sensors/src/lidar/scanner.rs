@@ -21,7 +21,7 @@ use super::roadside::PlacedSolid;
 use super::soft::{self, Air, AirColumn, ColumnDroplets, Plume};
 use super::solid::Solid;
 use super::spoil::{Added, Spoiler};
-use super::targets::Targets;
+use super::targets::{LayerMask, Targets};
 use super::viewpoint::Viewpoint;
 use super::{LaneGeometry, Lidar, LidarScan, MirrorSide, ScanTruth};
 use crate::Scene;
@@ -282,7 +282,7 @@ impl Scanner {
             // beams are left that may meet something else.
             let solid = match is_road_discarded && are_rails_discarded() {
                 true => self.active.solid_layers(),
-                false => u64::MAX,
+                false => LayerMask::MAX,
             };
             let with_droplets = if in_air {
                 if !self.plumes.is_empty() {

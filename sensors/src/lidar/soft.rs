@@ -28,7 +28,7 @@ use super::echo::PULSE_M;
 use super::noise::{LEAST_UNIFORM, Noise, Purpose};
 use super::power::{LinkBudget, MIN_POWER};
 use super::solid::Solid;
-use super::targets::{FaceRange, Targets, layers_below};
+use super::targets::{FaceRange, LayerMask, Targets, layers_below};
 use super::{Material, PointSource};
 
 /// Ratio of extinction to backscatter of water droplets at 905 nm (sr).
@@ -219,9 +219,9 @@ pub(crate) struct ColumnDroplets {
     /// Effect on the beam of each layer, if it has been computed.
     effects: Vec<DropletEffect>,
     /// Bit mask of the layers whose effect has been computed.
-    computed: u64,
+    computed: LayerMask,
     /// Bit mask of the layers whose beams get a return from droplets that may be detected.
-    pub(crate) detectable: u64,
+    pub(crate) detectable: LayerMask,
 }
 
 impl ColumnDroplets {
@@ -234,13 +234,13 @@ impl ColumnDroplets {
     /// Computes the effects on the beams of these layers (a bit mask) anew. The other beams must
     /// get no return from droplets that may be detected.
     #[inline(always)]
-    pub(crate) fn compute(&mut self, layers: u64, effect: impl Fn(usize) -> DropletEffect) {
+    pub(crate) fn compute(&mut self, layers: LayerMask, effect: impl Fn(usize) -> DropletEffect) {
         (self.computed, self.detectable) = (layers, 0);
         let mut left = layers;
         while left != 0 {
             let layer = left.trailing_zeros() as usize;
             self.effects[layer] = effect(layer);
-            self.detectable |= u64::from(self.effects[layer].is_detectable()) << layer;
+            self.detectable |= LayerMask::from(self.effects[layer].is_detectable()) << layer;
             left &= left - 1;
         }
     }
@@ -325,7 +325,7 @@ impl AirColumn<'_> {
     ///
     /// Written without branches, so that the layers are tested side by side in vector registers.
     #[inline(always)]
-    pub(crate) fn layers_with_returns(&self, air: &Air<'_>) -> u64 {
+    pub(crate) fn layers_with_returns(&self, air: &Air<'_>) -> LayerMask {
         let (has_spray, has_fog) = (self.greatest_depth > 0.0, air.link.has_fog());
         if !has_spray && !has_fog {
             return 0;
@@ -349,7 +349,7 @@ impl AirColumn<'_> {
                 }
             }
             for (lane, may) in may.into_iter().enumerate() {
-                mask |= u64::from(may) << (first + lane);
+                mask |= LayerMask::from(may) << (first + lane);
             }
         }
         mask & layers_below(self.layers)

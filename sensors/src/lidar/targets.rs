@@ -78,15 +78,19 @@ pub(crate) struct Part {
     /// Columns that may hit the solid.
     pub(crate) columns: Range<usize>,
     /// Bit mask of the layers that may hit the solid.
-    pub(crate) layers: u64,
+    pub(crate) layers: LayerMask,
     /// Whether the solid belongs to a guard rail.
     pub(crate) is_guard_rail: bool,
 }
 
+/// A bit mask of layers, the lowest layer in the lowest bit. Its width is the greatest number of
+/// layers of a pattern, [`MAX_LAYERS`](super::kind::MAX_LAYERS).
+pub(crate) type LayerMask = u128;
+
 /// Returns the bit mask of the lowest layers, up to this number of them.
-#[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 64 layers")]
-pub(crate) fn layers_below(end: usize) -> u64 {
-    1_u64.checked_shl(end as u32).map_or(u64::MAX, |next| next - 1)
+#[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 128 layers")]
+pub(crate) fn layers_below(end: usize) -> LayerMask {
+    1_u128.checked_shl(end as u32).map_or(LayerMask::MAX, |next| next - 1)
 }
 
 /// The surface properties that all faces of an object have in common.

@@ -41,6 +41,19 @@ fn a_rate_of_10_hz_gives_10_scans_in_a_second() {
 }
 
 #[test]
+fn a_pattern_has_up_to_128_layers() {
+    let kind = LidarModel::Os1With128.kind();
+    // 2 · 189 + 1 columns.
+    assert_eq!((kind.layers(), kind.beams()), (128, 379 * 128));
+    let too_many = |config: &mut LidarKindConfig| {
+        config.layers_per_group = None;
+        config.layers_deg = (0..129).map(|layer| 0.1 * f64::from(layer)).collect();
+    };
+    let error = checked(too_many).unwrap_err();
+    assert_eq!(error, "`layers-deg` is 129, but a list of 1 to 128 elevations is needed");
+}
+
+#[test]
 fn the_sides_of_a_mirror_alternate_from_scan_to_scan_at_every_rate() {
     for rate_hz in [25.0, 20.0, 12.5, 10.0, 3.0] {
         let kind = checked(|config| config.rate_hz = rate_hz).unwrap();
@@ -108,7 +121,7 @@ fn a_wrong_value_is_answered_with_key_and_allowed_range() {
     let error = checked(|config| config.layers_per_group = Some(5)).unwrap_err();
     assert!(error.contains("1 to 4 groups"), "{error}");
     let error = checked(|config| config.layers_deg = Vec::new()).unwrap_err();
-    assert!(error.contains("1 to 64"), "{error}");
+    assert!(error.contains("1 to 128"), "{error}");
     let error = checked(|config| config.range_probability = f64::NAN).unwrap_err();
     assert!(error.contains("from 0.5 to 0.99"), "{error}");
     let far = |config: &mut LidarKindConfig| (config.range_m, config.range_reflectivity) = (500.0, 0.01);

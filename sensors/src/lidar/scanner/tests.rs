@@ -62,7 +62,7 @@ impl Scanner {
             self.hits.clear();
             self.active.advance_to(index, &self.targets);
             for &part in self.active.parts() {
-                let part = (&self.targets.parts[part], u64::MAX);
+                let part = (&self.targets.parts[part], LayerMask::MAX);
                 fearless_simd::dispatch!(Level::new(), simd => self.hits.cast(simd, (column, elevations), part, &self.targets));
             }
             let brute = by_brute_force(column, elevations, &self.targets);

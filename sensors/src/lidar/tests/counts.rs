@@ -49,6 +49,21 @@ fn point_counts_on_a_truck_match_the_scan_pattern() {
 }
 
 #[test]
+fn the_upper_half_of_128_layers_meets_a_truck() {
+    let kind = LidarModel::Os1With128.kind();
+    let mut setup = TestScene::new().with(VehicleClass::Truck, 5.0, 0.0);
+    let mut lidar = RearLidar::new(Lidar { kind, dropout: 0.0, nominal_range_m: 500.0, ..Lidar::default() });
+    setup.detect(&mut lidar, 0);
+    let mut is_hit = [false; 128];
+    for (beam, point) in lidar.latest().beam.iter().zip(&lidar.truth().points) {
+        is_hit[usize::from(*beam) % 128] |= point.source == PointSource::Actor(1);
+    }
+    // A beam at 22° meets the cab, 5 m away, 2.6 m above the ground.
+    let upper = is_hit[64..].iter().filter(|is_hit| **is_hit).count();
+    assert!(upper >= 60, "{upper} of the upper 64 layers");
+}
+
+#[test]
 fn point_counts_on_a_car_follow_from_the_columns_and_layers_that_meet_it() {
     for gap_m in [3.0, 4.0, 5.0] {
         let points = TestScene::new().with(VehicleClass::Car, gap_m, 0.0).mean_points();
