@@ -1,7 +1,8 @@
 //! LiDARs whose scan pattern is a separate file. It is read together with the scenario file.
 //!
-//! The contents of the file replace `pattern-file` in the text of the scenario. All later steps
-//! (checking, hashing, a campaign's manifest, replay) do not need the file.
+//! The contents of the file replace `pattern-file` in the text of the scenario, and the table of
+//! beams replaces `beams-file` in a pattern. All later steps (checking, hashing, a campaign's
+//! manifest, replay) do not need the files.
 
 use std::path::Path;
 
@@ -13,6 +14,8 @@ use super::{ScenarioConfig, ScenarioError, locate};
 
 /// The key of the file, and the key that its contents become.
 const KEYS: [&str; 2] = ["pattern-file", "pattern"];
+/// The key of the file with a table of beams, and the key that its contents become.
+const BEAMS: [&str; 2] = ["beams-file", "beams"];
 
 /// Puts the contents of each pattern file in place of its name, in the contents of a scenario file
 /// and in its text. Returns the text, or `None` if no pattern file is named. `path` is the path of
@@ -24,14 +27,22 @@ const KEYS: [&str; 2] = ["pattern-file", "pattern"];
 pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, ScenarioError> {
     let mut document: Option<DocumentMut> = None;
     for ((key, index), lidar) in lidars(config) {
-        let Some(name) = &lidar.pattern_file else { continue };
         let element = index.map_or_else(String::new, |index| format!("[{index}]"));
-        let (kind, pattern) = read(&path.with_file_name(name), &format!("sensors.{key}{element}.{}", KEYS[0]))?;
+        let at = format!("sensors.{key}{element}");
+        let (kind, pattern) = match (&lidar.pattern_file, &lidar.pattern) {
+            (Some(name), _) => read(&path.with_file_name(name), &format!("{at}.{}", KEYS[0]))?,
+            (None, Some(kind)) if kind.beams_file.is_some() => {
+                let kind = with_beams(path, kind.clone(), &format!("{at}.{}.{}", KEYS[1], BEAMS[0]))?;
+                let pattern = as_table(&kind, path)?;
+                (kind, pattern)
+            }
+            _ => continue,
+        };
         let syntax = |message: &str| {
             let line = text.lines().position(|line| line.contains(KEYS[0])).map_or(1, |index| index + 1);
             ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`{}`: {message}", KEYS[0]) }
         };
-        if lidar.pattern.is_some() {
+        if lidar.pattern_file.is_some() && lidar.pattern.is_some() {
             return Err(syntax("contradicts `pattern`: one of the two describes the LiDAR"));
         }
         let document = match &mut document {
@@ -82,13 +93,37 @@ fn read(path: &Path, key: &str) -> Result<(LidarKindConfig, toml_edit::InlineTab
         let line = locate::line_at(&text, error.span().map_or(0, |span| span.start));
         syntax(line, error.message().to_owned())
     })?;
+    let config = with_beams(path, config, BEAMS[0])?;
     config.kind().map_err(|source| {
         let line = locate::line_of(&text, &source.path);
         ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
     })?;
-    let plain = toml::to_string(&config).map_err(|error| syntax(1, error.to_string()))?;
-    let document: DocumentMut = plain.parse().map_err(|error: toml_edit::TomlError| syntax(1, error.to_string()))?;
-    Ok((config, document.as_table().clone().into_inline_table()))
+    let table = as_table(&config, path)?;
+    Ok((config, table))
+}
+
+/// Returns a pattern as a table of TOML. `path` is the path of the file that has it.
+fn as_table(config: &LidarKindConfig, path: &Path) -> Result<toml_edit::InlineTable, ScenarioError> {
+    let syntax = |message| ScenarioError::Syntax { path: path.to_owned(), line: 1, message };
+    let plain = toml::to_string(config).map_err(|error| syntax(error.to_string()))?;
+    let document: DocumentMut = plain.parse().map_err(|error: toml_edit::TomlError| syntax(error.to_string()))?;
+    Ok(document.as_table().clone().into_inline_table())
+}
+
+/// Puts the contents of the table of beams in place of its name, if the pattern names one. `path` is the path of the file that
+/// has the pattern, and `key` the key that names the table.
+fn with_beams(path: &Path, config: LidarKindConfig, key: &str) -> Result<LidarKindConfig, ScenarioError> {
+    let Some(name) = &config.beams_file else { return Ok(config) };
+    let table = path.with_file_name(name);
+    let syntax = |line, message| ScenarioError::Syntax { path: table.clone(), line, message };
+    if config.beams.is_some() {
+        return Err(syntax(1, format!("`{key}` contradicts `{}`: one of the two describes the LiDAR", BEAMS[1])));
+    }
+    let text = read_text(&table).map_err(|source| {
+        let source = std::io::Error::new(source.kind(), format!("`{key}` names this file: {source}"));
+        ScenarioError::Read { path: table.clone(), source }
+    })?;
+    config.with_beams(&text).map_err(|error| syntax(error.line(), error.to_string()))
 }
 
 #[cfg(test)]
@@ -138,6 +173,54 @@ mod tests {
             let cause = std::error::Error::source(&error).map(ToString::to_string).unwrap_or_default();
             assert!(cause.contains("`sensors.additional-rear-lidars[1].pattern-file` names this file"), "{cause}");
         }
+    }
+
+    /// The pattern of a LiDAR that scans no raster.
+    const ROSETTE: &str = "name = \"rosette\"\nsource = \"a test\"\nbeams-file = \"beams.csv\"\n\
+         half-field-deg = 30.0\nazimuth-step-deg = 0.2\nbeam-width-deg = 0.1\nbeam-height-deg = 0.1\n\
+         layer-spacing-deg = 0.2\nrate-hz = 10.0\nrange-m = 80.0\nrange-reflectivity = 0.1\n\
+         range-probability = 0.9\nrange-sd-m = 0.02\nrange-sd-at-threshold-m = 0.06\n";
+    const BEAM_ROWS: &str = "azimuth_deg,elevation_deg,time_offset_us\n-12.5,0.5,0\n3.25,-1,50000\n";
+
+    #[test]
+    fn a_table_of_beams_becomes_part_of_the_scenario_from_a_pattern_file_or_from_a_pattern() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("beams.csv"), BEAM_ROWS).unwrap();
+        let name = library::plain_names().next().unwrap();
+        let inner = format!("base = \"{name}\"\n[sensors.rear-lidar.pattern]\n{ROSETTE}");
+        for file in [
+            parse(folder.path(), ROSETTE).unwrap(),
+            ScenarioFile::parse(&folder.path().join("scenario.toml"), &inner, &[]).unwrap(),
+        ] {
+            let pattern = file.config().sensors.rear_lidar.pattern.as_ref().unwrap();
+            let beams = vec![[-12.5, 0.5, 0.0], [3.25, -1.0, 50_000.0]];
+            assert_eq!((&pattern.beams, &pattern.beams_file), (&Some(beams), &None));
+            file.check().unwrap();
+            let again = ScenarioFile::parse(Path::new("elsewhere.toml"), file.text(), &[]).unwrap();
+            assert_eq!(again.config(), file.config());
+        }
+    }
+
+    #[test]
+    fn a_wrong_table_of_beams_is_named_with_file_line_column_and_allowed_range() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = folder.path().join("beams.csv");
+        let fails = |rows: &str, pattern: &str| {
+            std::fs::write(&table, rows).unwrap();
+            parse(folder.path(), pattern).unwrap_err().to_string()
+        };
+        let message = fails(&BEAM_ROWS.replace("3.25", "31"), ROSETTE);
+        let wrong = "column `azimuth_deg` is `31`, but a number from -30 to 30 is needed";
+        assert!(message.contains("beams.csv:3: ") && message.ends_with(wrong), "{message}");
+        let message = fails("", ROSETTE);
+        assert!(message.contains("beams.csv:1: ") && message.contains("time_offset_us"), "{message}");
+        let both = format!("layers-deg = [0.0]\n{ROSETTE}");
+        let message = fails(BEAM_ROWS, &both);
+        assert!(message.contains("mine.toml:1: `layers-deg` contradicts `beams`"), "{message}");
+        std::fs::remove_file(&table).unwrap();
+        let error = parse(folder.path(), ROSETTE).unwrap_err();
+        let cause = std::error::Error::source(&error).map(ToString::to_string).unwrap_or_default();
+        assert!(error.is_io() && cause.contains("`beams-file` names this file"), "{cause}");
     }
 
     #[test]

@@ -19,6 +19,8 @@ const EVERY_KEY: &str = include_str!("../../docs/reference/scenario/every-key.to
 const RECORDED_ACTOR: &str = "recorded";
 /// The key of a LiDAR that names another file, which is not part of the program either.
 const PATTERN_FILE: &str = "pattern-file";
+/// The key of a pattern that names another file.
+const BEAMS_FILE: &str = "beams-file";
 /// Larger than every number that a scenario allows.
 const HUGE: f64 = 1e300;
 /// Bound of a quantity that may have any value: it is not written.
@@ -80,7 +82,13 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
     // A pattern in a file has the ranges of a pattern in the scenario.
     let sensors = document.get_mut("sensors").and_then(toml::Value::as_table_mut);
     for (_, sensor) in sensors.into_iter().flatten() {
-        sensor.as_table_mut().and_then(|sensor| sensor.remove(PATTERN_FILE));
+        match sensor {
+            toml::Value::Table(sensor) => remove_files(sensor),
+            toml::Value::Array(several) => {
+                several.iter_mut().filter_map(toml::Value::as_table_mut).for_each(remove_files);
+            }
+            _ => {}
+        }
     }
     // The ranges of distributions depend on the other numbers of the same distribution.
     let sampled = ["parameters"];
@@ -89,6 +97,14 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
         search.visit(&format!("/properties/{key}"), &[Segment::Key(key.clone())], value);
     }
     search.ranges
+}
+
+/// Removes the keys of a sensor that name other files.
+fn remove_files(sensor: &mut Table) {
+    sensor.remove(PATTERN_FILE);
+    if sensor.get("pattern").is_some_and(|pattern| pattern.get(BEAMS_FILE).is_some()) {
+        sensor.remove("pattern");
+    }
 }
 
 struct Search<'a> {

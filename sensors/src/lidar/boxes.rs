@@ -22,9 +22,6 @@ use super::receiver::MAX_INTENSITY;
 use super::{LaneGeometry, LidarScan};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Number of columns at either end of the field of view. A cluster with a point in one of them may
-/// extend beyond the field of view.
-const EDGE_COLUMNS: usize = 4;
 /// One point in this many may lie ahead of the front face because of noise.
 const POINTS_PER_STRAY: usize = 20;
 /// Depth within which points count as lying on the front face (m).
@@ -273,9 +270,9 @@ impl BoxFit {
 /// Returns whether the last of these beams is in the outermost columns on the ego's right, and the
 /// first in the outermost columns on its left. The sweep begins on the left.
 fn truncated_edges(beams: [u16; 2], scan: &LidarScan) -> [bool; 2] {
-    let Resolution { columns: count, layers, .. } = scan.resolution;
+    let Resolution { columns: count, layers, edge_columns: [first_edge, last_edge], .. } = scan.resolution;
     let [first, last] = beams.map(|beam| usize::from(beam) / layers);
-    [last + EDGE_COLUMNS >= count, first < EDGE_COLUMNS]
+    [last + last_edge >= count, first < first_edge]
 }
 
 /// Returns true if the points surely extend over more than [`REFINE_LENGTH_M`] behind the front

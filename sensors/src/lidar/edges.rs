@@ -49,6 +49,10 @@ pub(crate) struct Edges {
 ///
 /// `heading` has sine and cosine of the heading of the box.
 pub(super) fn edges(fit: &BoxFit, heading: [f64; 2], members: &[u32], scan: &LidarScan) -> Option<Edges> {
+    // Without a raster, the next beam is anywhere above or below.
+    if !scan.resolution.is_raster {
+        return None;
+    }
     // Where footprints overlap, a beam beyond the edge may meet the face.
     if fit.footprint_columns > 1.0 + ROUNDING {
         return None;

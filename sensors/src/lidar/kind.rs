@@ -1,7 +1,8 @@
 //! The kinds of LiDAR: scan pattern, rate, footprint and range as a file describes them.
 //!
 //! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its
-//! `model`, or a file of its own by `pattern-file`.
+//! `model`, or a file of its own by `pattern-file`. A LiDAR that scans no raster has a table of beams
+//! in place of layers and columns ([`super::beam_table`]).
 //!
 //! The range of a target of reflectivity ρ that fills the beam follows from one published range R
 //! at the reflectivity ρ₀, which the sensor reaches with the probability p: the received power is
@@ -16,8 +17,8 @@ use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Probl
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::beam_table::{self, BeamFileError, BeamLimits, BeamTable};
 use super::pattern::{GROUPS, mirror_bounds_deg};
-
 use super::{LidarModel, MirrorSide};
 
 /// Height of a sensor if nothing else is said (m): in the bumper.
@@ -33,11 +34,16 @@ const SD_DECIMALS: f64 = 1e4;
 /// Greatest number of layers.
 pub(super) const MAX_LAYERS: usize = 128;
 /// Greatest elevation of a layer (°).
-const MAX_ELEVATION_DEG: f64 = 45.0;
+pub(super) const MAX_ELEVATION_DEG: f64 = 45.0;
 /// Greatest number of beams in a scan: beams are numbered with 16 bits.
-const MAX_BEAMS: usize = 65_535;
+pub(super) const MAX_BEAMS: usize = 65_535;
 /// Greatest difference from a whole number of azimuth steps (steps).
 const STEP_TOLERANCE: f64 = 1e-6;
+/// Number of columns at either end of the field of view. A cluster with a point in one of them may
+/// extend beyond the field of view.
+const EDGE_COLUMNS: u8 = 4;
+/// Azimuth steps that the model covers (°).
+const AZIMUTH_STEP_DEG: Range = Range::closed(0.02, 2.0);
 /// Greatest half of the horizontal field of view (°).
 pub(crate) const MAX_HALF_FIELD_DEG: f64 = 85.0;
 /// Nominal ranges that the model covers (m).
@@ -56,8 +62,19 @@ pub struct LidarKindConfig {
     /// Where the numbers are published.
     pub source: String,
     /// Elevations of the layers at azimuth 0, without the mirror's contribution (deg): 1 to 128,
-    /// from the lowest to the highest.
+    /// from the lowest to the highest. Default: none; `beams` then gives the pattern.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layers_deg: Vec<f64>,
+    /// CSV file with the directions and times of all beams of a scan, in place of `layers-deg`, for
+    /// a LiDAR that scans no raster; relative to the file with this key. Its first line is
+    /// `azimuth_deg,elevation_deg,time_offset_us`. The azimuth is about the sensor's axis, positive
+    /// to its left as it looks. The time counts from the begin of the scan. Its contents become
+    /// `beams` when the scenario is read. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beams_file: Option<String>,
+    /// Rows of such a file: azimuth (deg), elevation (deg) and time (µs) of each beam. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beams: Option<Vec<[f64; 3]>>,
     /// Number of successive layers that share an azimuth shift: a divisor of the number of layers,
     /// which makes 4 groups or fewer. Default: all layers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,9 +87,11 @@ pub struct LidarKindConfig {
     /// mirror.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mirror_cubic_deg: Option<[f64; 4]>,
-    /// Half of the horizontal field of view (deg): a whole number of azimuth steps.
+    /// Half of the horizontal field of view (deg): a whole number of azimuth steps, unless `beams`
+    /// gives the pattern.
     pub half_field_deg: f64,
-    /// Azimuth step (deg).
+    /// Azimuth step (deg). With `beams`, the usual distance of beams that lie side by side: the
+    /// processing derives from it what a beam may have missed.
     pub azimuth_step_deg: f64,
     /// Half of the field about the axis in which the steps are finer (deg). Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -114,6 +133,10 @@ pub struct LidarKindConfig {
 pub(crate) struct Resolution {
     pub(crate) columns: usize,
     pub(crate) layers: usize,
+    /// Whether neighbouring columns lie side by side.
+    pub(crate) is_raster: bool,
+    /// Number of the first and of the last columns that lie at an end of the field of view.
+    pub(crate) edge_columns: [usize; 2],
     /// Azimuth step outside of the fine field (rad).
     pub(crate) step_rad: f64,
     /// Half of the fine field (rad), and the step in it (rad).
@@ -153,6 +176,8 @@ pub struct LidarKind {
     pub(crate) mirror_cubic_deg: Option<[f64; 4]>,
     /// Azimuth of each column (°).
     pub(crate) azimuths_deg: Vec<f64>,
+    /// The beams of a LiDAR that scans no raster: each is a column of one layer.
+    pub(super) table: Option<BeamTable>,
     pub(crate) half_field_deg: f64,
     /// Finest azimuth step (°).
     pub(crate) finest_step_deg: f64,
@@ -208,8 +233,11 @@ impl LidarKind {
     }
 
     /// Returns the time after the scan's start at which a column at this azimuth is measured (s),
-    /// clamped to the sweep.
+    /// clamped to the sweep. Without a raster, it is the mean time of the beams near this azimuth.
     pub(crate) fn sweep_offset_s(&self, azimuth_deg: f64) -> f64 {
+        if let Some(table) = &self.table {
+            return table.mean_offset_s(azimuth_deg);
+        }
         let share = ((azimuth_deg + self.half_field_deg) / (2.0 * self.half_field_deg)).clamp(0.0, 1.0);
         share * self.sweep_ns * 1e-9
     }
@@ -224,6 +252,15 @@ impl LidarKindConfig {
         toml::from_str(text)
     }
 
+    /// Returns the same pattern with the table of beams that the text of its `beams-file` holds.
+    ///
+    /// # Errors
+    /// [`BeamFileError`] with the line and the column that are wrong, and the allowed range.
+    pub fn with_beams(self, text: &str) -> Result<Self, BeamFileError> {
+        let beams = beam_table::read(text, self.beam_limits())?;
+        Ok(Self { beams_file: None, beams: Some(beams), ..self })
+    }
+
     /// Checks the keys, and returns the kind. The same keys always give the same reference.
     ///
     /// # Errors
@@ -234,8 +271,8 @@ impl LidarKindConfig {
 
     /// Returns the azimuths of all columns (°).
     fn azimuths_deg(&self) -> Result<Vec<f64>, ConfigError> {
-        let step = number(self.azimuth_step_deg, "azimuth-step-deg", Range::closed(0.02, 2.0))?;
-        let half = number(self.half_field_deg, "half-field-deg", Range::closed(5.0, MAX_HALF_FIELD_DEG))?;
+        let step = number(self.azimuth_step_deg, "azimuth-step-deg", AZIMUTH_STEP_DEG)?;
+        let half = self.checked_half_field_deg()?;
         let fine_half =
             number(self.fine_half_field_deg.unwrap_or(0.0), "fine-half-field-deg", Range::closed(0.0, half))?;
         let fine_step =
@@ -246,6 +283,40 @@ impl LidarKindConfig {
         let middle = (-fine..=fine).map(|index| f64::from(index) * fine_step);
         let right = (1..=coarse).map(|index| fine_half + f64::from(index) * step);
         Ok(left.chain(middle).chain(right).collect())
+    }
+
+    /// Returns the table of beams, if there is one.
+    fn checked_table(&self) -> Result<Option<BeamTable>, ConfigError> {
+        if self.beams_file.is_some() {
+            let needed =
+                "the contents of the file that `beams-file` names, which a scenario that is read from a file has";
+            return Err(ConfigError::new("beams", Problem::Missing { needed }));
+        }
+        let Some(beams) = &self.beams else { return Ok(None) };
+        let of_rasters = [
+            (!self.layers_deg.is_empty(), "layers-deg"),
+            (self.layers_per_group.is_some(), "layers-per-group"),
+            (self.group_shift_deg != 0.0, "group-shift-deg"),
+            (self.mirror_cubic_deg.is_some(), "mirror-cubic-deg"),
+            (self.fine_half_field_deg.is_some(), "fine-half-field-deg"),
+            (self.fine_azimuth_step_deg.is_some(), "fine-azimuth-step-deg"),
+            (self.sweep_share.is_some(), "sweep-share"),
+        ];
+        if let Some((_, key)) = of_rasters.into_iter().find(|(is_given, _)| *is_given) {
+            let rule = "a table of beams gives all directions and times".to_owned();
+            return Err(ConfigError::new(key, Problem::Contradiction { other: "beams", rule }));
+        }
+        self.checked_half_field_deg()?;
+        number(self.azimuth_step_deg, "azimuth-step-deg", AZIMUTH_STEP_DEG)?;
+        BeamTable::new(beams, self.beam_limits()).map(Some)
+    }
+
+    fn beam_limits(&self) -> BeamLimits {
+        BeamLimits { half_field_deg: self.half_field_deg, rate_hz: self.rate_hz }
+    }
+
+    fn checked_half_field_deg(&self) -> Result<f64, ConfigError> {
+        number(self.half_field_deg, "half-field-deg", Range::closed(5.0, MAX_HALF_FIELD_DEG))
     }
 
     /// Returns the number of layers of a group.
@@ -309,9 +380,14 @@ impl Check for LidarKindConfig {
     type Checked = LidarKind;
 
     fn check(&self, _: &Parameters) -> Result<LidarKind, ConfigError> {
-        let layers_per_group = self.checked_group()?;
-        let azimuths_deg = self.azimuths_deg()?;
-        let beams = azimuths_deg.len() * self.layers_deg.len();
+        let rate_hz = number(self.rate_hz, "rate-hz", Range::closed(1.0, 1.0 / CONTROL_STEP.s()))?;
+        let table = self.checked_table()?;
+        // A beam of a table is a column of one layer.
+        let (layers_deg, layers_per_group, azimuths_deg) = match &table {
+            Some(table) => (vec![0.0], 1, table.azimuths_deg.clone()),
+            None => (self.layers_deg.clone(), self.checked_group()?, self.azimuths_deg()?),
+        };
+        let beams = azimuths_deg.len() * layers_deg.len();
         if beams > MAX_BEAMS {
             let problem = Problem::WrongCount { value: beams as u64, allowed: "a pattern of at most 65,535 beams" };
             return Err(ConfigError::new("layers-deg", problem));
@@ -320,7 +396,6 @@ impl Check for LidarKindConfig {
             number(*coefficient, "mirror-cubic-deg", Range::closed(-5.0, 5.0))?;
         }
         let half_field_deg = self.half_field_deg;
-        let rate_hz = number(self.rate_hz, "rate-hz", Range::closed(1.0, 1.0 / CONTROL_STEP.s()))?;
         let share = match self.sweep_share {
             Some(share) => number(share, "sweep-share", Range::above(0.0, 1.0))?,
             None => half_field_deg / 180.0,
@@ -332,14 +407,22 @@ impl Check for LidarKindConfig {
         let beam = Range::closed(0.01, 3.0);
         let spacing_deg = number(self.layer_spacing_deg, "layer-spacing-deg", Range::closed(0.02, 10.0))?;
         let [least_deg, most_deg] = mirror_bounds_deg(self.mirror_cubic_deg, &azimuths_deg);
+        let top_deg = match &table {
+            Some(table) => Some(table.elevation_bounds_deg()[1]),
+            None => layers_deg.last().copied(),
+        };
         // The other side of the mirror contributes the opposite.
-        let highest_deg = self
-            .layers_deg
-            .last()
-            .map_or(0.0, |layer_deg| layer_deg + 0.5 * self.beam_height_deg + least_deg.min(-most_deg));
+        let highest_deg =
+            top_deg.map_or(0.0, |layer_deg| layer_deg + 0.5 * self.beam_height_deg + least_deg.min(-most_deg));
+        let edge_columns = match &table {
+            Some(table) => table.edge_beams(half_field_deg, f64::from(EDGE_COLUMNS) * self.azimuth_step_deg),
+            None => [usize::from(EDGE_COLUMNS); 2],
+        };
         let resolution = Resolution {
             columns: azimuths_deg.len(),
-            layers: self.layers_deg.len(),
+            layers: layers_deg.len(),
+            is_raster: table.is_none(),
+            edge_columns,
             step_rad: self.azimuth_step_deg * degree,
             fine_rad: [self.fine_half_field_deg.unwrap_or(0.0) * degree, fine_step_deg * degree],
             layer_rad: spacing_deg * degree,
@@ -356,7 +439,7 @@ impl Check for LidarKindConfig {
         let single = |value: f64, key, range| number(value, key, range).map(|value| value as f32);
         Ok(LidarKind {
             name: self.name.clone(),
-            layers_deg: self.layers_deg.clone(),
+            layers_deg,
             layers_per_group,
             group_shift_deg: number(self.group_shift_deg, "group-shift-deg", Range::closed(0.0, 1.0))?,
             mirror_cubic_deg: self.mirror_cubic_deg,
@@ -368,10 +451,12 @@ impl Check for LidarKindConfig {
             beam_height_deg: number(self.beam_height_deg, "beam-height-deg", beam)?,
             period_ns,
             // At the rate of the control loop, the product is a product of whole numbers.
-            sweep_ns: match self.sweep_share {
-                None => period_ns as f64 * half_field_deg / 180.0,
-                Some(_) => period_ns as f64 * share,
+            sweep_ns: match (&table, self.sweep_share) {
+                (Some(table), _) => f64::from(table.duration_ns()),
+                (None, None) => period_ns as f64 * half_field_deg / 180.0,
+                (None, Some(_)) => period_ns as f64 * share,
             },
+            table,
             nominal_range_m: self.nominal_range_m()?,
             max_range_m: match self.max_range_m {
                 Some(max_range_m) => single(max_range_m, "max-range-m", Range::closed(5.0, 500.0))?,

@@ -12,6 +12,7 @@
 
 mod across;
 mod bare_road;
+mod beam_table;
 mod boxes;
 mod candidate;
 mod cast;
@@ -55,6 +56,7 @@ mod viewpoint;
 pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
 pub use crate::tracking::LaneGeometry;
+pub use beam_table::BeamFileError;
 pub use clustering::{ClusteredPoints, ClusteringCheck, ClusteringMethod, ClusteringModel};
 pub(crate) use config::{FRONT_NAME, REAR_NAME};
 pub use config::{Lidar, LidarConfig};

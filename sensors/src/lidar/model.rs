@@ -40,7 +40,8 @@ impl LidarModel {
 
     /// Returns the model's pattern and range.
     pub fn kind(self) -> &'static LidarKind {
-        static SHIPPED: [OnceLock<&'static LidarKind>; LidarModel::ALL.len()] = [const { OnceLock::new() }; LidarModel::ALL.len()];
+        static SHIPPED: [OnceLock<&'static LidarKind>; LidarModel::ALL.len()] =
+            [const { OnceLock::new() }; LidarModel::ALL.len()];
         SHIPPED[self as usize].get_or_init(|| {
             let kind = LidarKindConfig::parse(self.file()).map_err(|error| error.to_string());
             let kind = kind.and_then(|config| config.kind().map_err(|error| error.to_string()));

@@ -13,11 +13,13 @@
 //! The azimuth φ is measured about the z axis of the sensor's frame, from its x axis, which points
 //! backward: column 0 points to the ego's left, the last column to its right.
 //!
-//! A [`LidarKind`] says where the layers and the columns lie. A beam has a footprint. 2 × 4
+//! A [`LidarKind`] says where the layers and the columns lie. Without a raster, each beam is a column
+//! of one layer, with an elevation and a time of its own. A beam has a footprint. 2 × 4
 //! sub-rays of equal weight sample it.
 
 use std::sync::{Mutex, PoisonError};
 
+use super::beam_table::BeamTable;
 use super::{LidarKind, MirrorSide};
 use closecall_traffic::maths;
 
@@ -168,6 +170,8 @@ pub struct Pattern {
     pub(crate) least_cosine: f32,
     /// Bounds of the mirror's contribution to the elevation (°).
     mirror_bounds_deg: [f64; 2],
+    /// Least and greatest elevation of the beams, if they form no raster (°).
+    elevation_bounds_deg: Option<[f64; 2]>,
 }
 
 impl Pattern {
@@ -188,7 +192,7 @@ impl Pattern {
 
     /// Returns the pattern of a kind of LiDAR.
     pub fn new(kind: &'static LidarKind) -> Self {
-        let columns: Vec<Column> = kind.azimuths_deg.iter().map(|azimuth_deg| column(kind, *azimuth_deg)).collect();
+        let columns: Vec<Column> = (0..kind.azimuths_deg.len()).map(|index| column(kind, index)).collect();
         let sides: &[MirrorSide] = match kind.mirror_cubic_deg {
             Some(_) => &[MirrorSide::Plus, MirrorSide::Minus],
             None => &[MirrorSide::Plus],
@@ -196,10 +200,10 @@ impl Pattern {
         let elevations: Vec<Vec<Elevation>> = sides
             .iter()
             .map(|mirror_side| {
-                let column_elevations = |column: &Column| -> Vec<Elevation> {
-                    (0..kind.layers()).map(|layer| elevation(kind, layer, column.azimuth_deg, *mirror_side)).collect()
+                let column_elevations = |column: usize| -> Vec<Elevation> {
+                    (0..kind.layers()).map(|layer| elevation(kind, [column, layer], *mirror_side)).collect()
                 };
-                columns.iter().flat_map(column_elevations).collect()
+                (0..columns.len()).flat_map(column_elevations).collect()
             })
             .collect();
         let of_side = |elevations: &Vec<Elevation>| {
@@ -216,6 +220,7 @@ impl Pattern {
             line_bounds: centre_lines.iter().map(bounds).collect(),
             centre_lines,
             mirror_bounds_deg: mirror_bounds_deg(kind.mirror_cubic_deg, &kind.azimuths_deg),
+            elevation_bounds_deg: kind.table.as_ref().map(BeamTable::elevation_bounds_deg),
         }
     }
 
@@ -271,6 +276,9 @@ impl Pattern {
         high_deg: f64,
     ) -> std::ops::Range<usize> {
         let half = 0.5 * self.kind.beam_height_deg;
+        if let Some([least, most]) = self.elevation_bounds_deg {
+            return 0..usize::from(most + half >= low_deg && least - half <= high_deg);
+        }
         let [least, most] = self.mirror_bounds_deg;
         let (lowest, highest) = match mirror_side {
             MirrorSide::Plus => (least, most),
@@ -291,7 +299,7 @@ impl Pattern {
         let (column, layer) = (usize::from(beam) / layers, usize::from(beam) % layers);
         let azimuth_deg = self.columns[column].azimuth_deg;
         let group = layer / self.kind.layers_per_group;
-        let elevation_deg = layer_deg(self.kind, layer, azimuth_deg, mirror_side);
+        let elevation_deg = layer_deg(self.kind, [column, layer], mirror_side);
         (group_azimuth_deg(self.kind, azimuth_deg, group).to_radians(), elevation_deg.to_radians())
     }
 }
@@ -312,8 +320,12 @@ fn cubic_deg([c0, c1, c2, c3]: [f64; 4], azimuth_deg: f64) -> f64 {
     ((c3 * azimuth_deg + c2) * azimuth_deg + c1) * azimuth_deg + c0
 }
 
-/// Returns the elevation of a layer at an azimuth (°).
-fn layer_deg(kind: &LidarKind, layer: usize, azimuth_deg: f64, mirror_side: MirrorSide) -> f64 {
+/// Returns the elevation of a layer in a column (°).
+fn layer_deg(kind: &LidarKind, [column, layer]: [usize; 2], mirror_side: MirrorSide) -> f64 {
+    if let Some(table) = &kind.table {
+        return table.elevations_deg[column];
+    }
+    let azimuth_deg = kind.azimuths_deg[column];
     match (kind.mirror_cubic_deg, mirror_side) {
         (None, _) => kind.layers_deg[layer],
         (Some(cubic), MirrorSide::Plus) => kind.layers_deg[layer] + cubic_deg(cubic, azimuth_deg),
@@ -327,11 +339,13 @@ fn group_azimuth_deg(kind: &LidarKind, azimuth_deg: f64, group: usize) -> f64 {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the model's directions are single precision: 1e-7 rad")]
-fn column(kind: &LidarKind, azimuth_deg: f64) -> Column {
+fn column(kind: &LidarKind, index: usize) -> Column {
+    let azimuth_deg = kind.azimuths_deg[index];
+    #[expect(clippy::cast_sign_loss, reason = "clamped to 0 and above")]
+    let swept_ns = || (kind.sweep_offset_s(azimuth_deg) * 1e9) as u32;
     let mut column = Column {
         azimuth_deg,
-        #[expect(clippy::cast_sign_loss, reason = "clamped to 0 and above")]
-        offset_ns: (kind.sweep_offset_s(azimuth_deg) * 1e9) as u32,
+        offset_ns: kind.table.as_ref().map_or_else(swept_ns, |table| table.offsets_ns[index]),
         centre: [[0.0; 2]; GROUPS],
         cos: [[0.0; SUBRAY_COLUMNS]; GROUPS],
         sin: [[0.0; SUBRAY_COLUMNS]; GROUPS],
@@ -352,8 +366,8 @@ fn column(kind: &LidarKind, azimuth_deg: f64) -> Column {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the model's directions are single precision: 1e-7 rad")]
-fn elevation(kind: &LidarKind, layer: usize, azimuth_deg: f64, mirror_side: MirrorSide) -> Elevation {
-    let centre_deg = layer_deg(kind, layer, azimuth_deg, mirror_side);
+fn elevation(kind: &LidarKind, [column, layer]: [usize; 2], mirror_side: MirrorSide) -> Elevation {
+    let centre_deg = layer_deg(kind, [column, layer], mirror_side);
     let subray_rad = |upward: usize| {
         let offset_deg = kind.beam_height_deg * ((upward as f64 + 0.5) / SUBRAY_ROWS as f64 - 0.5);
         (centre_deg + offset_deg).to_radians()

@@ -249,7 +249,8 @@ impl Receiver<'_> {
             let through =
                 if is_strong { self.air.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
             let power = echo.power * through;
-            PotentialReturn { range_m: echo.range_m, power, source: face.source, material: face.material }
+            let range_m = self.targets.drifted_m(echo.face, echo.range_m, self.column.offset_ns);
+            PotentialReturn { range_m, power, source: face.source, material: face.material }
         });
         let (mut is_first, mut last) = (true, None);
         for (index, potential) in soft.into_iter().chain(hard).enumerate() {

@@ -317,6 +317,9 @@ fn beam_towards(seen_m: &Vector3<f64>, pattern: &Pattern, mirror_side: MirrorSid
     {
         return None;
     }
+    if let Some(table) = &kind.table {
+        return table.nearest([azimuth_deg, elevation_rad.to_degrees()]);
+    }
     let columns = &kind.azimuths_deg;
     let near = columns.partition_point(|column_deg| *column_deg < azimuth_deg).min(columns.len() - 1);
     let beam_of = |column: usize, layer: usize| u16::try_from(column * layers + layer).ok();

@@ -108,6 +108,25 @@ pub(crate) struct Beams<'a> {
     pub(crate) mirror_side: MirrorSide,
 }
 
+/// The change of the range at which a beam meets a face while the face moves relative to the sensor.
+///
+/// A face n·p = w that moves by v·Δ in the time Δ has the plane n·p = w + n·v·Δ. A beam then meets
+/// it at 1 + (m·v)·Δ times the range, with m = n/w. Its rotation is neglected.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FaceDrift {
+    /// Relative change of the range, m·v (1/s).
+    per_s: f32,
+    /// Time after the begin of the scan at which the face is where the targets have it (s).
+    at_s: f32,
+}
+
+impl FaceDrift {
+    /// Returns the factor of the range for a beam of this time after the begin of the scan (s).
+    fn factor(self, offset_s: f32) -> f32 {
+        1.0 + self.per_s * (offset_s - self.at_s)
+    }
+}
+
 /// All solids of a scene. The allocated memory is reused from scan to scan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Targets {
@@ -115,6 +134,9 @@ pub(crate) struct Targets {
     pub(crate) faces: Vec<Face>,
     /// Solids that at least one beam may hit.
     pub(crate) parts: Vec<Part>,
+    /// How the faces move during a scan, in their order. Empty for a raster, whose neighbouring
+    /// columns are measured one after the other: the solid is cast at their time.
+    drifts: Vec<FaceDrift>,
 }
 
 impl Targets {
@@ -122,6 +144,29 @@ impl Targets {
     pub(crate) fn clear(&mut self) {
         self.faces.clear();
         self.parts.clear();
+        self.drifts.clear();
+    }
+
+    /// Notes how the faces move that have been appended since the last call: with `velocity_mps` in
+    /// the sensor's frame (m/s). They are where the targets have them `at_s` after the begin of the
+    /// scan (s).
+    #[expect(clippy::cast_possible_truncation, reason = "a factor of a range in single precision")]
+    pub(crate) fn note_drift(&mut self, velocity_mps: Vector3<f64>, at_s: f64) {
+        for face in &self.faces[self.drifts.len()..] {
+            let [x, y, z] = face.inverse.map(f64::from);
+            let per_s = x * velocity_mps.x + y * velocity_mps.y + z * velocity_mps.z;
+            self.drifts.push(FaceDrift { per_s: per_s as f32, at_s: at_s as f32 });
+        }
+    }
+
+    /// Returns the range at which a beam meets a face (m), `offset_ns` after the begin of the scan,
+    /// for the range at which it meets the face where the targets have it.
+    #[inline(always)]
+    pub(crate) fn drifted_m(&self, face: u32, range_m: f32, offset_ns: u32) -> f32 {
+        match self.drifts.get(face as usize) {
+            None => range_m,
+            Some(drift) => range_m * drift.factor(offset_ns as f32 * 1e-9),
+        }
     }
 
     /// Appends a solid, unless no beam can hit it from outside.

@@ -8,6 +8,7 @@ mod counts;
 mod motion;
 mod parts;
 mod surroundings;
+mod table;
 
 use super::*;
 use crate::testing::{scene_vehicle, with_speed};

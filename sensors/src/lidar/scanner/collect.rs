@@ -1,7 +1,7 @@
 //! The solids and the spray of a scene that a sweep may hit.
 
 use closecall_traffic::{PlanePose, Roadside, maths};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::super::material::asphalt;
 use super::super::roadside::{append_guard_rails, append_roadside};
@@ -25,6 +25,7 @@ impl Scanner {
         let ground = |_| asphalt(scene.environment);
         let surface = Surface { source: PointSource::Ground, reflectivity: &ground };
         self.targets.push_ground(&view.sensor_from_plane(0.0), surface);
+        self.note_rest();
         if scene.road.has_guard_rails() {
             self.collect_along_road((scene, PointSource::GuardRail), mirror_side, view);
         }
@@ -53,8 +54,13 @@ impl Scanner {
         let surface = Surface { source, reflectivity: &steel };
         for (solid, pose) in &self.guard_rails {
             let placed = plane_from_body(*pose, 0.0);
-            let frozen = view.sensor_from_plane(self.crossing_before_end_s(view, &placed)) * placed;
+            let before_end_s = self.crossing_before_end_s(view, &placed);
+            let frozen = view.sensor_from_plane(before_end_s) * placed;
             self.targets.push(Beams { pattern: self.pattern, mirror_side }, solid, &frozen, surface);
+            if self.has_drifts() {
+                let velocity = velocity_mps(|before_s| view.sensor_from_plane(before_s) * placed, before_end_s);
+                self.targets.note_drift(velocity, self.sweep_s() - before_end_s);
+            }
         }
     }
 
@@ -80,6 +86,13 @@ impl Scanner {
         for solid in &self.solids {
             self.targets.push(Beams { pattern: self.pattern, mirror_side }, solid, &frozen, surface);
         }
+        if self.has_drifts() {
+            let placed = |before_end_s: f64| {
+                let moved = moved_back(pose, other, before_end_s);
+                view.sensor_from_plane(before_end_s) * plane_from_body(moved, other.pitch_rad)
+            };
+            self.targets.note_drift(velocity_mps(placed, before_end_s), self.sweep_s() - before_end_s);
+        }
     }
 
     fn collect_plume(&mut self, vehicle: &SceneVehicle, scene: &Scene<'_>, view: &Viewpoint) {
@@ -100,6 +113,21 @@ impl Scanner {
         let columns = Targets::columns_of(self.pattern, &solid, &placed);
         let faces = self.targets.push_faces(&solid, &placed, surface);
         self.plumes.push(Plume::new((faces, columns), (&solid, &placed), extinction_per_m));
+        self.note_rest();
+    }
+
+    /// Returns whether neighbouring beams are measured at any times, so that the motion of a solid
+    /// during the scan matters.
+    fn has_drifts(&self) -> bool {
+        self.pattern.kind().table.is_some()
+    }
+
+    /// Notes that the latest faces rest relative to the sensor, as the road and spray do: both look
+    /// the same from wherever the ego is.
+    fn note_rest(&mut self) {
+        if self.has_drifts() {
+            self.targets.note_drift(Vector3::zeros(), 0.0);
+        }
     }
 
     /// Returns how long before its end the sweep crosses the origin of a body's frame (s).
@@ -107,6 +135,16 @@ impl Scanner {
         let middle = view.sensor_from_plane(0.0) * (plane_from_thing * Point3::origin());
         self.sweep_s() - self.pattern.kind().sweep_offset_s(maths::atan2(middle.y, middle.x).to_degrees())
     }
+}
+
+/// Step over which a velocity is taken (s).
+const VELOCITY_STEP_S: f64 = 1e-3;
+
+/// Returns the velocity of a solid in the sensor's frame (m/s), whose pose there `before_end_s`
+/// before the end of the scan is `placed`.
+fn velocity_mps(placed: impl Fn(f64) -> Isometry3<f64>, before_end_s: f64) -> Vector3<f64> {
+    let at = |before_end_s: f64| placed(before_end_s).translation.vector;
+    (at(before_end_s - VELOCITY_STEP_S) - at(before_end_s)) / VELOCITY_STEP_S
 }
 
 /// Returns the pose of a vehicle `before_end_s` earlier, extrapolated at its current speed and
