@@ -6,7 +6,7 @@ use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road, maths};
 
-use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
+use super::inert_object_fault::{refuse_of_map, refuse_of_objects, refuse_of_radars};
 use super::intervention::FaultConfig;
 
 /// Refuses faults that cannot act: faults of sensors that do not exist in the mode of the scenario,
@@ -48,7 +48,9 @@ pub(super) fn refuse(
     refuse_late("front-radar", &mut fault.front_radar.iter().map(|entry| &entry.from_s))?;
     refuse_late("surround", &mut fault.surround.iter().map(|entry| &entry.from_s))?;
     refuse_late("rear-object", &mut fault.rear_object.iter().map(|entry| &entry.from_s))?;
+    refuse_late("rear-radar", &mut fault.rear_radar.iter().map(|entry| &entry.from_s))?;
     refuse_of_objects(fault, sensors, parameters)?;
+    refuse_of_radars(fault, sensors, parameters)?;
     match &fault.odometry {
         Some(odometry) => refuse_of_map(odometry, (sensors, road), duration_s, parameters),
         None => Ok(()),
@@ -126,10 +128,12 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
     let mode = sensors.mode();
     let (has_lidar, has_camera) = (!fault.rear_lidar.is_empty(), !fault.rear_camera.is_empty());
     let has_object = !fault.rear_object.is_empty();
-    let is_for_both = has_object && (has_lidar || has_camera) && mode != SensorMode::GroundTruth;
+    let has_radar = !fault.rear_radar.is_empty();
+    let is_for_both = has_object && (has_lidar || has_camera || has_radar) && mode != SensorMode::GroundTruth;
     let (has_front_lidar, has_front_radar) = (!fault.front_lidar.is_empty(), !fault.front_radar.is_empty());
     let is_front_for_both = has_front_lidar && has_front_radar && mode != SensorMode::GroundTruth;
     let full_only = "LiDAR and camera exist in mode `full` only";
+    let radar_only = "the rear radars exist in mode `full` only";
     let object_only = "the object-level sensor behind exists in mode `object` only";
     let no_sensor = "mode `ground-truth` has no sensor that can fail";
     let camera_is_off = mode == SensorMode::Full && sensors.camera().pipeline == Pipeline::Off;
@@ -137,6 +141,13 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
     let absent = [
         (has_lidar && mode != SensorMode::Full && !is_for_both, "rear-lidar", MODE, full_only),
         (has_camera && mode != SensorMode::Full && !is_for_both, "rear-camera", MODE, full_only),
+        (has_radar && mode != SensorMode::Full && !is_for_both, "rear-radar", MODE, radar_only),
+        (
+            has_radar && sensors.full_model().rear_radar.is_none(),
+            "rear-radar",
+            "sensors.rear-radar",
+            "there are no rear radars that can fail",
+        ),
         (has_object && mode != SensorMode::Object && !is_for_both, "rear-object", MODE, object_only),
         (is_truth && has_front_radar, "front-radar", MODE, no_sensor),
         (is_truth && !fault.surround.is_empty(), "surround", MODE, no_sensor),
@@ -244,6 +255,14 @@ mod tests {
                 "`fault.front-lidar`",
             ),
             (format!("{full}{ahead}"), "fault.front-lidar", "no LiDAR looks ahead"),
+            (format!("{full}[[fault.rear-radar]]\ndead = true\n"), "fault.rear-radar", "no rear radars"),
+            (
+                format!(
+                    "{full}sensors.rear-radar = {{}}\n[[fault.rear-radar]]\nblocked-from-deg = 0.0\nblocked-to-deg = 120.0\n"
+                ),
+                "fault.rear-radar[0].blocked-to-deg",
+                "from -105 to 105",
+            ),
             (format!("{object}{front}{ahead}"), "fault.front-lidar", "in mode `full` only"),
             (format!("{truth}{front}{ahead}{radar}"), "fault.front-radar", "no sensor that can fail"),
             (

@@ -38,6 +38,22 @@ pub(super) fn refuse_of_objects(
     Ok(())
 }
 
+/// Refuses blocked sectors outside of the field of view of the rear radars.
+pub(super) fn refuse_of_radars(
+    fault: &FaultConfig,
+    sensors: &Sensors,
+    parameters: &Parameters,
+) -> Result<(), ConfigError> {
+    let Some(radar) = sensors.full_model().rear_radar else { return Ok(()) };
+    for (index, entry) in fault.rear_radar.iter().enumerate() {
+        for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
+            let checked = parameters.number_or(end.as_ref(), key, radar.azimuths_deg(), 0.0);
+            checked.map_err(|error| at("rear-radar", index, error))?;
+        }
+    }
+    Ok(())
+}
+
 /// Refuses errors of the map that begin after the end of the run, that no sensor could show, or
 /// that make a road which the models do not cover, and missing guard rails on a road without any.
 pub(super) fn refuse_of_map(

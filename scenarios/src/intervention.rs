@@ -13,7 +13,7 @@
 use closecall_controllers::{CheckedDriver, EgoState, ReactionChange};
 use closecall_sensors::Alterations;
 use closecall_sensors::faults::{
-    CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig, OdometryErrorConfig,
+    CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig, OdometryErrorConfig, RadarFaultConfig,
 };
 use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
@@ -114,6 +114,9 @@ pub struct FaultConfig {
     /// Faults of the object-level sensor that replaces LiDAR and camera in mode `object`, at most
     /// four.
     pub rear_object: Vec<ObjectFaultConfig>,
+    /// Faults of the rear radars, at most four: sensor mode `full` with `sensors.rear-radar`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rear_radar: Vec<RadarFaultConfig>,
     /// Errors of the ego's odometry and map. The ego does not know them. Default: none.
     pub odometry: Option<OdometryErrorConfig>,
 }
@@ -158,6 +161,7 @@ impl Interventions {
             front_lidar: &fault.front_lidar,
             rear_camera: &fault.rear_camera,
             object: [&fault.front_radar, &fault.surround, &fault.rear_object],
+            rear_radar: &fault.rear_radar,
             odometry: fault.odometry.as_ref(),
         };
         let faults = entries.check(parameters).map_err(|error| error.within("fault"))?;

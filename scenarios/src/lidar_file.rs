@@ -110,8 +110,8 @@ fn as_table(config: &LidarKindConfig, path: &Path) -> Result<toml_edit::InlineTa
     Ok(document.as_table().clone().into_inline_table())
 }
 
-/// Puts the contents of the table of beams in place of its name, if the pattern names one. `path` is the path of the file that
-/// has the pattern, and `key` the key that names the table.
+/// Puts the contents of the table of beams in place of its name, if the pattern names one. `path`
+/// is the path of the file that has the pattern, and `key` the key that names the table.
 fn with_beams(path: &Path, config: LidarKindConfig, key: &str) -> Result<LidarKindConfig, ScenarioError> {
     let Some(name) = &config.beams_file else { return Ok(config) };
     let table = path.with_file_name(name);

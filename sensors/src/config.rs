@@ -17,7 +17,8 @@ use crate::lidar::{ClusteringCheck, ClusteringMethod, ClusteringModel, FRONT_NAM
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
     Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
-    ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, SensorError, TrackerConfig,
+    ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, RearFit, RearRadarConfig, SensorError,
+    TrackerConfig,
 };
 
 /// Default number of core points of DBSCAN, that of `ClusteredPoints::CORE_POINTS`.
@@ -104,6 +105,10 @@ pub struct SensorsConfig {
     /// its faults. Default: none; the radar looks ahead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front_lidar: Option<LidarConfig>,
+    /// The pair of radars in the rear corners, which measures the speeds of the tracks besides the
+    /// rear LiDARs, in mode `full`. `fault.rear-radar` gives its faults. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rear_radar: Option<RearRadarConfig>,
     /// The rear camera, whose network classifies each cluster of the rear LiDAR.
     pub rear_camera: CameraConfig,
     /// The tracker that processes the boxes of the rear LiDAR.
@@ -164,6 +169,7 @@ impl Default for SensorsConfig {
             rear_lidar: LidarConfig::default(),
             additional_rear_lidars: Vec::new(),
             front_lidar: None,
+            rear_radar: None,
             rear_camera: CameraConfig::default(),
             tracker: TrackerConfig::default(),
         }
@@ -193,6 +199,10 @@ impl Check for SensorsConfig {
             None => None,
         };
         let additional_rear_lidars = self.check_additional([Some(rear_lidar), front_lidar], parameters)?;
+        let rear_radar = match &self.rear_radar {
+            Some(radar) => Some(radar.check(parameters).map_err(within("rear-radar"))?),
+            None => None,
+        };
         let core_points = usize::from(self.cluster_core_points);
         if !ClusteringModel::CORE_POINTS.contains(&core_points) {
             let problem = Problem::WrongCount { value: core_points as u64, allowed: "a number from 2 to 20" };
@@ -209,6 +219,7 @@ impl Check for SensorsConfig {
                 front_radar: self.front_radar.check_front_radar(parameters).map_err(within("front-radar"))?,
                 surround: self.surround.check_surround(parameters).map_err(within("surround"))?,
                 rear_lidar,
+                rear_radar,
                 additional_rear_lidars,
                 front_lidar,
                 tracker: self.tracker.check(parameters).map_err(within("tracker"))?,
@@ -352,7 +363,8 @@ impl Sensors {
     /// Returns the same sensors with stages that are replaced by the truth, or made worse.
     #[must_use]
     pub fn altered(self, altered: Alterations) -> Self {
-        let FullModel { front_radar, front_lidar, surround, rear_lidar, additional_rear_lidars, tracker } = self.full;
+        let FullModel { front_radar, front_lidar, surround, rear_lidar, additional_rear_lidars, tracker, .. } =
+            self.full;
         let exact = |lidar: Lidar| if altered.has_true_points { lidar.exact() } else { lidar };
         let full = FullModel {
             front_radar: front_radar.altered(&altered, false),
@@ -362,6 +374,7 @@ impl Sensors {
             additional_rear_lidars: additional_rear_lidars.map(|lidar| lidar.map(exact)),
             tracker: tracker
                 .with_latency_steps(altered.latency_steps(tracker.latency_steps(), MAX_TRACKER_LATENCY_STEPS)),
+            ..self.full
         };
         Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
     }
@@ -384,6 +397,7 @@ impl Sensors {
         self.faults().stated(ActingSensors {
             is_full: self.mode == SensorMode::Full,
             has_front_lidar: self.mode == SensorMode::Full && self.full.front_lidar.is_some(),
+            has_rear_radar: self.full.rear_radar.is_some(),
             has_models: self.mode != SensorMode::GroundTruth,
         })
     }
@@ -567,6 +581,15 @@ mod tests {
         let refused = |text: &str| check(text).unwrap_err().to_string();
         assert!(refused("cluster-core-points = 1").starts_with("`cluster-core-points` is 1, but"));
         assert!(refused("cluster-radius = 3").starts_with("`cluster-radius` is 3, but"));
+    }
+
+    #[test]
+    fn there_is_no_rear_radar_unless_the_scenario_has_one() {
+        let radar = |text: &str| check(text).unwrap().full_model().rear_radar;
+        assert!(radar("").is_none() && radar("rear-radar = {}").is_some());
+        let error = check("rear-radar = { yaw-deg = 90 }").unwrap_err().to_string();
+        assert_eq!(error, "`rear-radar.yaw-deg` is 90, but a number from 0 to 80 is needed");
+        assert!(!toml::to_string(&SensorsConfig::default()).unwrap().contains("rear-radar"));
     }
 
     #[test]

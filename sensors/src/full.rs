@@ -16,6 +16,7 @@ use crate::lidar_chain::MAX_ADDITIONAL_LIDARS;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
+use crate::radar::{RearRadar, RearRadars};
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Alterations, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
 
@@ -30,6 +31,8 @@ pub struct FullModel {
     pub surround: ObjectSensorModel,
     /// The rear LiDAR.
     pub rear_lidar: Lidar,
+    /// The pair of rear corner radars, if there is one.
+    pub rear_radar: Option<RearRadar>,
     /// Further rear LiDARs.
     pub additional_rear_lidars: [Option<Lidar>; MAX_ADDITIONAL_LIDARS],
     /// The tracker that processes the boxes of the rear LiDAR.
@@ -71,7 +74,10 @@ impl FullPerception {
             front: ObjectSensor::front_radar(model.front_radar, key),
             front_lidar: model.front_lidar.map(|lidar| FrontLidar::new(lidar, model.tracker, key)),
             surround: ObjectSensor::surround(model.surround, key),
-            rear: Some(LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"])),
+            rear: Some(
+                LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"])
+                    .with_radars(model.rear_radar.map(|radar| RearRadars::new(radar, key))),
+            ),
             belief: Belief::default(),
             classifier: None,
             outside: None,
@@ -120,7 +126,7 @@ impl FullPerception {
             front: self.front.with_faults(faults.front_radar),
             front_lidar: self.front_lidar.map(|lidar| lidar.with_faults(faults.front_lidar)),
             surround: self.surround.with_faults(faults.surround),
-            rear: self.rear.map(|rear| rear.with_faults(faults.rear_lidar)),
+            rear: self.rear.map(|rear| rear.with_faults(faults.rear_lidar).with_radar_faults(faults.rear_radar)),
             belief: Belief::new(faults.odometry),
             ..self
         }

@@ -4,6 +4,7 @@
 //! ```text
 //!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ clusters ─▶ boxes ┐
 //!  Scene ────┤ camera/  image crop at each cluster ─▶ classifier ─▶ class scores                ├─▶ tracking/ ─▶ tracks
+//!            ├ radar/   range, angle, radial speed of each vehicle behind ─────────────────────────▶ speed of tracks
 //!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
 //! ```
 
@@ -27,6 +28,7 @@ pub mod lidar;
 mod lidar_chain;
 mod object;
 mod perception;
+mod radar;
 mod recorded;
 mod surroundings;
 #[cfg(test)]
@@ -53,5 +55,6 @@ pub use object::{
     ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
 pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth, UsedBox};
+pub use radar::{RearRadar, RearRadarConfig};
 pub use recorded::{RecordedPerception, RecordedScanError};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -24,12 +24,13 @@ use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{Road, Time, VehicleState};
 
 use crate::external::{Outside, PerceptionAnswer};
-use crate::faults::{FaultList, LidarFault};
+use crate::faults::{FaultList, LidarFault, RadarFault};
 
 use crate::detection_classifier::DetectionClassifier;
 use crate::lidar::{Lidar, LidarScan, RESERVED_CLUSTERS};
 use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
+use crate::radar::RearRadars;
 use crate::surroundings::OtherVehicle;
 use crate::{Alterations, Detection, Health, Scene, SensorError};
 
@@ -62,6 +63,8 @@ pub(crate) struct LidarChain {
     step: u64,
     latency_steps: usize,
     tracker: Tracker,
+    /// The radars that measure the speeds of the tracks, if there are any.
+    radars: Option<RearRadars>,
     /// The scans of this step, with the indices of their sensors.
     scans: Vec<(usize, NewScan)>,
     /// The detections of several scans.
@@ -93,10 +96,21 @@ impl LidarChain {
             step: 0,
             latency_steps: tracker.latency_steps(),
             tracker: Tracker::new(tracker.with_scan_period_s(period_s)),
+            radars: None,
             scans: Vec::with_capacity(MAX_LIDARS),
             all: Vec::new(),
             uses: Vec::with_capacity(RESERVED_CLUSTERS),
         }
+    }
+
+    /// Returns the same chain, the speeds of whose tracks these radars measure, too.
+    pub(crate) fn with_radars(self, radars: Option<RearRadars>) -> Self {
+        Self { radars, ..self }
+    }
+
+    /// Returns the same chain with faults of its radars.
+    pub(crate) fn with_radar_faults(self, faults: FaultList<RadarFault>) -> Self {
+        Self { radars: self.radars.map(|radars| radars.with_faults(faults)), ..self }
     }
 
     /// Returns the same chain with faults of the sensors.
@@ -117,6 +131,7 @@ impl LidarChain {
         seen: Seen<'_>,
         classifier: Option<&mut Box<dyn DetectionClassifier>>,
     ) -> Result<(), SensorError> {
+        self.sense(&seen)?;
         let mut scans = std::mem::take(&mut self.scans);
         for (index, sensor) in self.sensors.iter_mut().enumerate() {
             if sensor.is_due(seen.scene.time) {
@@ -139,6 +154,7 @@ impl LidarChain {
         classifier: Option<&mut Box<dyn DetectionClassifier>>,
         outside: &mut Outside,
     ) -> Result<(), SensorError> {
+        self.sense(&seen)?;
         let mut scans = std::mem::take(&mut self.scans);
         let mut arrived = Vec::with_capacity(self.sensors.len());
         for (index, sensor) in self.sensors.iter_mut().enumerate() {
@@ -153,7 +169,8 @@ impl LidarChain {
         if !scans.is_empty() {
             match outside.ask([seen.scene, seen.believed], &arrived)? {
                 PerceptionAnswer::Detections(detections) => {
-                    // The boxes belong to no LiDAR alone. They come with the first scan that has arrived.
+                    // The boxes belong to no LiDAR alone. They come with the first scan that has
+                    // arrived.
                     let first = scans.iter().position(|(_, scan)| !scan.is_missing()).unwrap_or(0);
                     scans[first].1.detections.extend(detections);
                     self.classify(&seen, classifier, &mut scans)?;
@@ -222,6 +239,23 @@ impl LidarChain {
         Ok(())
     }
 
+    /// Lets the radars measure the scene.
+    fn sense(&mut self, seen: &Seen<'_>) -> Result<(), SensorError> {
+        let due_step = self.step + self.latency_steps as u64;
+        match &mut self.radars {
+            Some(radars) => radars.sense([seen.scene, seen.believed], due_step),
+            None => Ok(()),
+        }
+    }
+
+    /// Corrects the speeds of the tracks with the radar scans that are due, up to the time
+    /// `before`, which is excluded.
+    fn correct_speeds(&mut self, before: Option<Time>, rear_x_m: f64) {
+        if let Some(radars) = &mut self.radars {
+            radars.pass_due(self.step, before, |scan| self.tracker.correct_speeds(scan, rear_x_m));
+        }
+    }
+
     /// Appends scans to the queues of their sensors, and keeps the memory of the list.
     fn push(&mut self, seen: &Seen<'_>, mut scans: Vec<(usize, NewScan)>) {
         for (index, scan) in scans.drain(..) {
@@ -235,6 +269,7 @@ impl LidarChain {
     pub(crate) fn update_tracker(&mut self, rear_x_m: f64, list: &mut TrackList) {
         self.uses.clear();
         while let Some(time) = self.earliest_due() {
+            self.correct_speeds(Some(time), rear_x_m);
             let mut idle: [Option<RearView>; MAX_LIDARS] = [None; MAX_LIDARS];
             let mut due: [Option<TrackerScan<'_>>; MAX_LIDARS] = [None; MAX_LIDARS];
             let mut numbers = [0; MAX_LIDARS];
@@ -262,6 +297,7 @@ impl LidarChain {
             self.tracker.update_together(due.into_iter().flatten(), idle.into_iter().flatten(), list);
             self.uses.extend(self.tracker.uses().iter().map(|used| (numbers[used.sensor], *used)));
         }
+        self.correct_speeds(None, rear_x_m);
         self.step += 1;
     }
 
@@ -303,9 +339,12 @@ impl LidarChain {
         self.sensors.iter().map(ChainSensor::field)
     }
 
-    /// Returns the health of the sensors together.
+    /// Returns the health of the sensors together. Without a radar the chain works, less well.
     pub(crate) fn health(&self) -> Health {
-        health::of_all(&self.sensors)
+        match health::of_all(&self.sensors) {
+            Health::Ok if self.radars.as_ref().is_some_and(RearRadars::has_failed) => Health::Degraded,
+            health => health,
+        }
     }
 }
 

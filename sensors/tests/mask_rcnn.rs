@@ -30,6 +30,7 @@ fn faults(camera: &str, lidar: &str) -> Faults {
         front_lidar: &[],
         rear_camera: &camera,
         object: [&[], &[], &[]],
+        rear_radar: &[],
         odometry: None,
     };
     entries.check(&Parameters::default()).expect("valid settings and scenes")

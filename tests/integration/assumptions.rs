@@ -1,5 +1,5 @@
-//! Every constant of the controllers and drivers that is an assumption is in the list of
-//! `docs/reference/assumptions.md`, and nothing else is.
+//! Every constant of the controllers, drivers and rear radars that is an assumption is in the lists
+//! of `docs/reference/assumptions.md`, and nothing else is.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -40,9 +40,12 @@ fn assumed(text: &str) -> Vec<String> {
     names
 }
 
-/// Returns the first cells of the table of assumptions.
-fn listed(markdown: &str) -> BTreeSet<String> {
-    let (_, list) = markdown.split_once("# Assumed constants").unwrap();
+const PAGE: &str = include_str!("../../docs/reference/assumptions.md");
+/// The heading of the list of the rear radars, which follows that of the controllers.
+const OF_RADARS: &str = "## Rear radars";
+
+/// Returns the first cells of a table of assumptions.
+fn listed(list: &str) -> BTreeSet<String> {
     let rows = list.lines().filter_map(|line| line.strip_prefix("| `"));
     rows.filter_map(|row| row.split_once('`')).map(|(name, _)| name.to_owned()).collect()
 }
@@ -53,5 +56,15 @@ fn every_assumed_constant_of_the_controllers_is_listed() {
     let assumed: BTreeSet<String> =
         files.iter().flat_map(|path| assumed(&std::fs::read_to_string(path).unwrap())).collect();
     assert!(assumed.len() > 40, "{assumed:?}");
-    assert_eq!(listed(include_str!("../../docs/reference/assumptions.md")), assumed);
+    let (of_controllers, _) = PAGE.split_once(OF_RADARS).unwrap();
+    assert_eq!(listed(of_controllers), assumed);
+}
+
+#[test]
+fn every_assumed_constant_of_the_rear_radars_is_listed() {
+    let folder = Path::new(ROOT).join("sensors/src");
+    let files = sources(&folder.join("radar")).into_iter().chain([folder.join("tracking/radar.rs")]);
+    let assumed: BTreeSet<String> = files.flat_map(|path| assumed(&std::fs::read_to_string(path).unwrap())).collect();
+    let (_, of_radars) = PAGE.split_once(OF_RADARS).unwrap();
+    assert_eq!(listed(of_radars), assumed);
 }

@@ -67,6 +67,7 @@ mod perceive;
 mod perception;
 mod rare;
 mod readme;
+mod rear_radar;
 mod reasons;
 mod reenact;
 mod reference_models;

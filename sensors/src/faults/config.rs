@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
+use super::radar::RadarFaultConfig;
 use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 use crate::camera::CameraFault;
 use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
@@ -349,6 +350,8 @@ pub struct FaultEntries<'a> {
     pub rear_camera: &'a [CameraFaultConfig],
     /// `[[fault.front-radar]]`, `[[fault.surround]]` and `[[fault.rear-object]]`
     pub object: [&'a [ObjectFaultConfig]; 3],
+    /// `[[fault.rear-radar]]`
+    pub rear_radar: &'a [RadarFaultConfig],
     /// `[fault.odometry]`
     pub odometry: Option<&'a super::OdometryErrorConfig>,
 }
@@ -368,6 +371,7 @@ impl FaultEntries<'_> {
             front_radar: ObjectFaultConfig::check_all("front-radar", front, parameters)?,
             surround: ObjectFaultConfig::check_all("surround", surround, parameters)?,
             rear_object: ObjectFaultConfig::check_all("rear-object", rear, parameters)?,
+            rear_radar: RadarFaultConfig::check_all("rear-radar", self.rear_radar, parameters)?,
             odometry: match self.odometry {
                 Some(odometry) => odometry.check(parameters).map_err(|error| error.within("odometry"))?,
                 None => super::OdometryErrors::default(),

@@ -1,8 +1,8 @@
 //! The checked faults of each sensor, and which of them hold at an instant.
 
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
+use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Side, Time};
 
-use super::{LidarFault, ObjectFault, OdometryErrors};
+use super::{LidarFault, ObjectFault, OdometryErrors, RadarFault};
 use crate::camera::CameraFault;
 
 /// Maximum number of entries of one sensor.
@@ -119,6 +119,25 @@ impl FaultList<LidarFault> {
     }
 }
 
+impl FaultList<RadarFault> {
+    /// Returns the entries of the radar on this side: the entries that name it, and the entries
+    /// that name no side.
+    pub(crate) fn of_side(self, side: Side) -> Self {
+        let is_own = |entry: &Entry<RadarFault>| entry.effect.side.is_none_or(|of| of == side);
+        Self { entries: self.entries.map(|entry| entry.filter(is_own)) }
+    }
+}
+
+#[cfg(test)]
+impl<T: Combine> FaultList<T> {
+    /// Returns the list of one fault that always holds.
+    pub(crate) fn throughout_of(effect: T) -> Self {
+        let mut list = Self::default();
+        list.entries[0] = Some(Entry { from_s: f64::NEG_INFINITY, until_s: f64::INFINITY, effect });
+        list
+    }
+}
+
 /// Checks start and end of an entry. Without them, it holds from before the start of the run, or to
 /// its end.
 pub(super) fn check_span([from, until]: [&Option<Num>; 2], parameters: &Parameters) -> Result<[f64; 2], ConfigError> {
@@ -142,6 +161,7 @@ pub struct Faults {
     pub(crate) front_radar: FaultList<ObjectFault>,
     pub(crate) surround: FaultList<ObjectFault>,
     pub(crate) rear_object: FaultList<ObjectFault>,
+    pub(crate) rear_radar: FaultList<RadarFault>,
     /// The errors of the ego's odometry and map.
     pub odometry: OdometryErrors,
 }
@@ -151,7 +171,7 @@ impl Faults {
     /// that all sensors depend on.
     pub fn concern_rear(&self) -> bool {
         let has_sensor = !(self.rear_lidar.is_empty() && self.rear_camera.is_empty() && self.rear_object.is_empty());
-        has_sensor || !self.odometry.is_none()
+        has_sensor || !self.rear_radar.is_empty() || !self.odometry.is_none()
     }
 
     /// Returns whether odometry and map are all that is wrong: such faults act in each mode of the
@@ -170,6 +190,7 @@ impl Faults {
             front_radar: self.front_radar.throughout(),
             surround: self.surround.throughout(),
             rear_object: self.rear_object.throughout(),
+            rear_radar: self.rear_radar.throughout(),
             odometry: self.odometry.throughout(),
         }
     }

@@ -5,6 +5,7 @@
 //!  [[fault.rear-lidar]]  ─▶ FaultList ─▶ what holds at this instant ─▶ scan, frames, health (also [[fault.front-lidar]])
 //!  [[fault.rear-camera]] ─▶     〃    ─▶            〃              ─▶ pixels of each crop, health
 //!  [[fault.front-radar]] and the other object-level sensors         ─▶ measurements, tracks, health
+//!  [[fault.rear-radar]]  ─▶     〃    ─▶            〃              ─▶ detections, health
 //!  [fault.odometry]      ─▶ OdometryErrors ─▶ the scene and the map as the ego believes them to be
 //! ```
 //!
@@ -23,6 +24,7 @@ mod config;
 mod list;
 mod object;
 mod odometry;
+mod radar;
 mod sector;
 #[cfg(test)]
 mod tests;
@@ -39,6 +41,8 @@ pub use words::{SensorGroup, StatedFault};
 pub(crate) use config::LidarFault;
 pub(crate) use object::ObjectFault;
 pub use object::ObjectFaultConfig;
+pub(crate) use radar::RadarFault;
+pub use radar::RadarFaultConfig;
 pub(crate) use sector::Sectors;
 
 /// Number of successive scans without output, or with the same output, after which the ego counts a

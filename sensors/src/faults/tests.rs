@@ -14,7 +14,7 @@ use closecall_traffic::{
 use serde::Deserialize;
 
 use super::config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
-use super::{Faults, NOTICED_AFTER_SCANS, ObjectFaultConfig, OdometryErrorConfig};
+use super::{Faults, NOTICED_AFTER_SCANS, ObjectFaultConfig, OdometryErrorConfig, RadarFaultConfig};
 use crate::camera::{Backend, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 use crate::lidar::PointSource;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
@@ -34,6 +34,7 @@ struct Table {
     front_radar: Vec<ObjectFaultConfig>,
     surround: Vec<ObjectFaultConfig>,
     rear_object: Vec<ObjectFaultConfig>,
+    rear_radar: Vec<RadarFaultConfig>,
     odometry: Option<OdometryErrorConfig>,
 }
 
@@ -44,6 +45,7 @@ fn faults(text: &str) -> Result<Faults, String> {
         front_lidar: &table.front_lidar,
         rear_camera: &table.rear_camera,
         object: [&table.front_radar, &table.surround, &table.rear_object],
+        rear_radar: &table.rear_radar,
         odometry: table.odometry.as_ref(),
     };
     entries.check(&Parameters::default()).map_err(|error| error.to_string())

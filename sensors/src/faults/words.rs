@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use closecall_traffic::Time;
+use closecall_traffic::{Side, Time};
 
 use super::list::{Combine, FaultList};
-use super::{Faults, LidarFault, ObjectFault, OdometryErrors};
+use super::{Faults, LidarFault, ObjectFault, OdometryErrors, RadarFault};
 use crate::camera::CameraFault;
 
 /// A group of sensors, as [`SensorHealth`](crate::SensorHealth) has them.
@@ -64,6 +64,8 @@ pub(crate) struct ActingSensors {
     pub(crate) is_full: bool,
     /// Whether a LiDAR looks ahead, and not the radar.
     pub(crate) has_front_lidar: bool,
+    /// Whether radars look back besides the LiDARs.
+    pub(crate) has_rear_radar: bool,
     /// Whether the sensors around the ego and the sensors that look back are models, and not the
     /// truth.
     pub(crate) has_models: bool,
@@ -83,6 +85,9 @@ impl Faults {
                 true => {
                     state(&mut stated, &self.rear_lidar, (SensorGroup::Rear, "rear LiDAR"));
                     state(&mut stated, &self.rear_camera, (SensorGroup::Rear, "rear camera"));
+                    if acting.has_rear_radar {
+                        state(&mut stated, &self.rear_radar, (SensorGroup::Rear, "rear radar"));
+                    }
                 }
                 false => state(&mut stated, &self.rear_object, (SensorGroup::Rear, "rear sensor")),
             }
@@ -200,6 +205,24 @@ impl Effects for ObjectFault {
             (self.yaw_rad != 0.0, "mounted askew".to_owned()),
             (is_noisy, "noisy".to_owned()),
             (self.ghost.is_some(), ghost),
+        ])
+    }
+}
+
+impl Effects for RadarFault {
+    fn of_sensor(&self) -> Option<&'static str> {
+        self.side.map(|side| match side {
+            Side::Left => "left",
+            Side::Right => "right",
+        })
+    }
+
+    fn effects(&self) -> Vec<String> {
+        those([
+            (self.is_dead, "dead".to_owned()),
+            (self.dropout > 0.0, format!("loses {} of its detections", percent(self.dropout))),
+            (self.blocked_deg.iter().any(Option::is_some), "partly blocked".to_owned()),
+            (self.range_share < 1.0, format!("dirty ({} of the range left)", percent(self.range_share))),
         ])
     }
 }

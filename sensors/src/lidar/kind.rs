@@ -1,8 +1,8 @@
 //! The kinds of LiDAR: scan pattern, rate, footprint and range as a file describes them.
 //!
 //! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its
-//! `model`, or a file of its own by `pattern-file`. A LiDAR that scans no raster has a table of beams
-//! in place of layers and columns ([`super::beam_table`]).
+//! `model`, or a file of its own by `pattern-file`. A LiDAR that scans no raster has a table of
+//! beams in place of layers and columns ([`super::beam_table`]).
 //!
 //! The range of a target of reflectivity ρ that fills the beam follows from one published range R
 //! at the reflectivity ρ₀, which the sensor reaches with the probability p: the received power is
@@ -72,7 +72,8 @@ pub struct LidarKindConfig {
     /// `beams` when the scenario is read. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams_file: Option<String>,
-    /// Rows of such a file: azimuth (deg), elevation (deg) and time (µs) of each beam. Default: none.
+    /// Rows of such a file: azimuth (deg), elevation (deg) and time (µs) of each beam. Default:
+    /// none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams: Option<Vec<[f64; 3]>>,
     /// Number of successive layers that share an azimuth shift: a divisor of the number of layers,

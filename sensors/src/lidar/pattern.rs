@@ -13,8 +13,8 @@
 //! The azimuth φ is measured about the z axis of the sensor's frame, from its x axis, which points
 //! backward: column 0 points to the ego's left, the last column to its right.
 //!
-//! A [`LidarKind`] says where the layers and the columns lie. Without a raster, each beam is a column
-//! of one layer, with an elevation and a time of its own. A beam has a footprint. 2 × 4
+//! A [`LidarKind`] says where the layers and the columns lie. Without a raster, each beam is a
+//! column of one layer, with an elevation and a time of its own. A beam has a footprint. 2 × 4
 //! sub-rays of equal weight sample it.
 
 use std::sync::{Mutex, PoisonError};

@@ -108,7 +108,8 @@ pub(crate) struct Beams<'a> {
     pub(crate) mirror_side: MirrorSide,
 }
 
-/// The change of the range at which a beam meets a face while the face moves relative to the sensor.
+/// The change of the range at which a beam meets a face while the face moves relative to the
+/// sensor.
 ///
 /// A face n·p = w that moves by v·Δ in the time Δ has the plane n·p = w + n·v·Δ. A beam then meets
 /// it at 1 + (m·v)·Δ times the range, with m = n/w. Its rotation is neglected.

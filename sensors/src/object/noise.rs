@@ -47,7 +47,7 @@ impl NoiseKey {
     }
 
     /// Returns the random stream of one channel for one actor.
-    pub(super) fn stream_about(&self, channel: &str, actor: usize) -> Stream {
+    pub(crate) fn stream_about(&self, channel: &str, actor: usize) -> Stream {
         match self.actors.get(actor) {
             Some(name) => self.stream(&format!("{channel}/{name}")),
             None => self.stream(&format!("{channel}/{actor}")),

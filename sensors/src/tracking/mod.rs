@@ -29,6 +29,7 @@ mod lane;
 pub mod lifecycle;
 mod measurement;
 pub mod motion;
+mod radar;
 pub mod road_filter;
 mod track_list;
 mod tracker;
@@ -39,6 +40,7 @@ pub use config::{DETECTION_PROBABILITY, MAX_LATENCY_STEPS, TrackerConfig, Tracke
 pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy, SeenPart};
 pub use gaussian::Gaussian;
 pub use lane::LaneGeometry;
+pub use radar::{RadarDetection, RadarScan};
 pub use track_list::TrackList;
 pub use tracker::{Tracker, TrackerScan};
 pub use view::{MAX_SIDE_AZIMUTH_RAD, RearView};

@@ -224,6 +224,11 @@ impl RoadFilter {
         }
     }
 
+    /// Corrects the filter with a measured speed along the road (m/s).
+    pub(crate) fn measure_speed(&mut self, speed_mps: f64, sd_mps: f64) {
+        self.along.measure_speed(speed_mps, sd_mps);
+    }
+
     /// Moves the point that the filter follows along the road by `offset_m`, which is known with
     /// the variance `variance_m2`.
     pub(crate) fn shift_along(&mut self, offset_m: f64, variance_m2: f64) {

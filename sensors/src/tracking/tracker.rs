@@ -19,6 +19,8 @@ use super::view::{Face, RearView};
 use crate::tracking::{Detection, SIDE_PROTRUSION_M, SeenBy};
 use closecall_traffic::ego_frame::EgoFrame;
 
+mod speeds;
+
 /// Speed difference below which a track inside another track's box is a part of the same vehicle
 /// (m/s).
 const MAX_PART_SPEED_MPS: f64 = 3.0;
@@ -325,24 +327,9 @@ impl Tracker {
     /// Predicts all tracks to the time of a scan, and corrects or starts the tracks that it
     /// detects.
     fn measure(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
-        // The time before the start of a run is negative. Before the first scan, there is nothing
-        // to predict.
-        let elapsed_s =
-            if scan.time > self.time && !self.tracks.is_empty() { (scan.time - self.time).s() } else { 0.0 };
-        self.time = scan.time.max(self.time);
         let frame = EgoFrame::new(scan.road, &scan.ego);
-        let ego_mps = scan.ego.speed_mps * maths::cos(scan.ego.heading_rad) / frame.path_scale(scan.ego.d_m);
-        let ego = EgoRear {
-            s_m: scan.ego.s_m + scan.rear_x_m,
-            d_m: scan.ego.d_m,
-            speed_mps: ego_mps,
-            half_lane_m: 0.5 * scan.road.lane_width_m(),
-        };
-        if elapsed_s > 0.0 {
-            for track in &mut self.tracks {
-                track.filter.predict(elapsed_s, &ego);
-            }
-        }
+        let ego = Self::ego_rear(scan.road, &scan.ego, scan.rear_x_m);
+        self.predict_to(scan.time, &ego);
         self.measurements.clear();
         let right_edge_m = scan.road.right_edge_m();
         let measured = scan.detections.iter().map(|detection| {
@@ -368,8 +355,32 @@ impl Tracker {
                 None => self.miss(track_index),
             }
         }
-        self.start_tracks(scan, ego_mps, list);
+        self.start_tracks(scan, ego.speed_mps, list);
         self.note_parts();
+    }
+
+    /// Returns the rear end of an ego in this state, whose rear end is at `rear_x_m` (m).
+    fn ego_rear(road: &Road, ego: &VehicleState, rear_x_m: f64) -> EgoRear {
+        let frame = EgoFrame::new(road, ego);
+        EgoRear {
+            s_m: ego.s_m + rear_x_m,
+            d_m: ego.d_m,
+            speed_mps: ego.speed_mps * maths::cos(ego.heading_rad) / frame.path_scale(ego.d_m),
+            half_lane_m: 0.5 * road.lane_width_m(),
+        }
+    }
+
+    /// Predicts all tracks to `time`, unless they are later. The ego's rear is then at `ego`.
+    fn predict_to(&mut self, time: Time, ego: &EgoRear) {
+        // The time before the start of a run is negative. Before the first scan, there is nothing
+        // to predict.
+        let elapsed_s = if time > self.time && !self.tracks.is_empty() { (time - self.time).s() } else { 0.0 };
+        self.time = time.max(self.time);
+        if elapsed_s > 0.0 {
+            for track in &mut self.tracks {
+                track.filter.predict(elapsed_s, ego);
+            }
+        }
     }
 
     /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that

@@ -1,0 +1,391 @@
+//! The two radars with their random errors, their faults, and the scans that wait for the tracker.
+//!
+//! Every scan takes the same number of random values of each vehicle in the scene, whether the
+//! vehicle is seen or not. Two runs that differ only in the ego's behaviour therefore have the same
+//! errors at the same times. For traffic that overtakes on the right, the radars and the signs of
+//! the angles are swapped, so that a mirrored scene has mirrored errors.
+
+use std::collections::VecDeque;
+
+use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::{CONTROL_STEP, Road, Side, StandardNormal, Stream, Time, VehicleState};
+use rand::RngExt;
+
+use super::config::RearRadar;
+use super::measure::{Mount, Reflector, mirrored, rails_m};
+use crate::faults::{FaultList, NOTICED_AFTER_SCANS, RadarFault};
+use crate::surroundings::{OtherVehicle, transform_scene};
+use crate::tracking::{RadarDetection, RadarScan};
+use crate::{NoiseKey, Scene, SensorError};
+
+/// The random streams of the radar on the side on which vehicles overtake, and of the other one.
+const CHANNELS: [&str; 2] = ["rear-radar-passing", "rear-radar-slow"];
+/// The sides of the radars, in the order of all lists.
+const SIDES: [Side; 2] = [Side::Left, Side::Right];
+
+/// The random numbers for one path of the signal of one radar to one vehicle.
+#[derive(Clone, Copy, Debug)]
+struct Draws {
+    /// Decides whether there is an image in a rail (0 to 1).
+    image: f64,
+    /// Decides whether the radar detects what is there (0 to 1).
+    detection: f64,
+    /// Errors of range, azimuth and radial speed (standard deviations).
+    errors: [f64; 3],
+}
+
+/// The random streams of both radars for one vehicle.
+#[derive(Clone, Debug)]
+struct TargetStreams {
+    /// Index in the scenario's list of actors.
+    actor: usize,
+    streams: [Stream; 2],
+}
+
+impl TargetStreams {
+    /// Returns the numbers of a scan: for the direct path, the path by way of the rail on the side
+    /// on which vehicles overtake, and by way of the other rail.
+    fn draw(&mut self, channel: usize) -> [Draws; 3] {
+        let rng = &mut self.streams[channel];
+        std::array::from_fn(|_| Draws {
+            image: rng.random(),
+            detection: rng.random(),
+            errors: std::array::from_fn(|_| rng.sample(StandardNormal)),
+        })
+    }
+}
+
+/// A scan of both radars whose processing latency has not elapsed.
+#[derive(Clone, Debug)]
+struct PendingScan {
+    time: Time,
+    /// Number of the step from which on the tracker may have the scan.
+    due_step: u64,
+    road: Road,
+    ego: VehicleState,
+    detections: [Vec<RadarDetection>; 2],
+}
+
+/// The pair of radars with its state.
+#[derive(Clone, Debug)]
+pub(crate) struct RearRadars {
+    model: RearRadar,
+    key: NoiseKey,
+    faults: FaultList<RadarFault>,
+    targets: Vec<TargetStreams>,
+    others: Vec<OtherVehicle>,
+    pending: VecDeque<PendingScan>,
+    /// Numbers of latest successive scans in which the left and the right radar delivered nothing.
+    dead_scans: [u32; 2],
+}
+
+/// What one radar looks at in one scan.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    scene: &'a Scene<'a>,
+    frame: &'a EgoFrame<'a>,
+    others: &'a [OtherVehicle],
+    mount: Mount,
+    fault: Option<RadarFault>,
+}
+
+impl RearRadars {
+    /// Creates the radars before their first step, with random streams keyed by `key`.
+    pub(crate) fn new(model: RearRadar, key: &NoiseKey) -> Self {
+        Self {
+            model,
+            key: key.clone(),
+            faults: FaultList::default(),
+            targets: Vec::new(),
+            others: Vec::new(),
+            pending: VecDeque::new(),
+            dead_scans: [0; 2],
+        }
+    }
+
+    /// Returns the same radars with faults.
+    pub(crate) fn with_faults(self, faults: FaultList<RadarFault>) -> Self {
+        Self { faults, ..self }
+    }
+
+    /// Returns whether a radar has delivered nothing for a while.
+    pub(crate) fn has_failed(&self) -> bool {
+        let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
+        self.dead_scans.iter().any(|scans| f64::from(*scans) * self.model.period_s() >= noticed_s)
+    }
+
+    /// Measures `scene`, which the ego believes to be `believed`, if a scan is due. The tracker may
+    /// have the scan from `due_step` on.
+    ///
+    /// # Errors
+    /// [`SensorError`] if the state of a vehicle is not finite.
+    pub(crate) fn sense(&mut self, [scene, believed]: [&Scene<'_>; 2], due_step: u64) -> Result<(), SensorError> {
+        if !self.model.is_due(scene.time) {
+            return Ok(());
+        }
+        let mut others = std::mem::take(&mut self.others);
+        let result = self.scan(scene, &mut others);
+        self.others = others;
+        let (time, road, ego) = (scene.time, *believed.road, believed.ego.state);
+        self.pending.push_back(PendingScan { time, due_step, road, ego, detections: result? });
+        Ok(())
+    }
+
+    /// Returns the detections of the left and of the right radar.
+    fn scan(
+        &mut self,
+        scene: &Scene<'_>,
+        others: &mut Vec<OtherVehicle>,
+    ) -> Result<[Vec<RadarDetection>; 2], SensorError> {
+        let frame = transform_scene(scene, others)?;
+        let passing = scene.road.overtaking_side();
+        let mut detections = [Vec::new(), Vec::new()];
+        for (index, side) in SIDES.into_iter().enumerate() {
+            let fault = self.faults.of_side(side).at(scene.time);
+            let is_dead = fault.is_some_and(|fault| fault.is_dead);
+            self.dead_scans[index] = if is_dead { self.dead_scans[index].saturating_add(1) } else { 0 };
+            let mount = self.model.mount(side, scene.ego.vehicle.dimensions.length_m);
+            let view = View { scene, frame: &frame, others: &others[..], mount, fault };
+            for place in 0..others.len() {
+                let target = self.target(others[place].actor);
+                let draws = self.targets[target].draw(usize::from(side != passing));
+                self.detect(view, place, draws, &mut detections[index]);
+            }
+        }
+        Ok(detections)
+    }
+
+    /// Appends the detections of the vehicle with this place in the list.
+    fn detect(&self, view: View<'_>, place: usize, draws: [Draws; 3], detections: &mut Vec<RadarDetection>) {
+        let point = view.mount.nearest_point(&view.others[place]);
+        let mut others = view.others.iter().enumerate().filter(|(other, _)| *other != place);
+        if others.any(|(_, other)| view.mount.is_hidden_by(&point, other)) {
+            return;
+        }
+        let [direct, images @ ..] = draws;
+        detections.extend(self.detection(view, &point, &direct));
+        let road = view.scene.road;
+        if !road.has_guard_rails() {
+            return;
+        }
+        let [left_m, right_m] = rails_m(road);
+        let rails_m = match road.overtaking_side() {
+            Side::Left => [left_m, right_m],
+            Side::Right => [right_m, left_m],
+        };
+        for (rail_m, draws) in rails_m.into_iter().zip(images) {
+            if draws.image < self.model.ghost_probability {
+                detections.extend(self.detection(view, &mirrored(&point, rail_m, view.frame), &draws));
+            }
+        }
+    }
+
+    /// Returns the measurement of a point; `None` if it is not detected.
+    fn detection(&self, view: View<'_>, point: &Reflector, draws: &Draws) -> Option<RadarDetection> {
+        let model = &self.model;
+        let fault = view.fault.unwrap_or_default();
+        let range_m = model.range_m * fault.range_share;
+        let echo = view.mount.echo(point, view.scene.ego.state.speed_mps, range_m)?;
+        let probability = model.detection_probability * (1.0 - fault.dropout);
+        if fault.is_dead || fault.hides(echo.azimuth_rad.to_degrees()) || !(draws.detection < probability) {
+            return None;
+        }
+        let turned = match view.scene.road.overtaking_side() {
+            Side::Left => 1.0,
+            Side::Right => -1.0,
+        };
+        let [range, azimuth, speed] = draws.errors;
+        Some(RadarDetection {
+            sensor_m: view.mount.at_m,
+            range_m: (echo.range_m + model.range_sd_m * range).max(0.0),
+            azimuth_rad: echo.azimuth_rad + turned * model.azimuth_sd_rad * azimuth,
+            radial_mps: echo.radial_mps + model.speed_sd_mps * speed,
+            range_sd_m: model.range_sd_m,
+            azimuth_sd_rad: model.azimuth_sd_rad,
+            radial_sd_mps: model.speed_sd_mps,
+        })
+    }
+
+    /// Returns the index of the streams of a vehicle, and adds them if the vehicle is new.
+    fn target(&mut self, actor: usize) -> usize {
+        self.targets.iter().position(|target| target.actor == actor).unwrap_or_else(|| {
+            let streams = CHANNELS.map(|channel| self.key.stream_about(channel, actor));
+            self.targets.push(TargetStreams { actor, streams });
+            self.targets.len() - 1
+        })
+    }
+
+    /// Calls `use_scan` with each scan that the tracker may have in `step`, in the order of their
+    /// times, up to the time `before`, which is excluded.
+    pub(crate) fn pass_due(&mut self, step: u64, before: Option<Time>, mut use_scan: impl FnMut(&RadarScan<'_>)) {
+        let is_next = |scan: &mut PendingScan| scan.due_step <= step && before.is_none_or(|before| scan.time < before);
+        while let Some(scan) = self.pending.pop_front_if(is_next) {
+            let [left, right] = &scan.detections;
+            use_scan(&RadarScan { time: scan.time, road: &scan.road, ego: scan.ego, detections: [left, right] });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, Check, Environment, Parameters, VehicleClass};
+
+    use super::super::measure::Echo;
+    use super::*;
+    use crate::SceneVehicle;
+    use crate::radar::RearRadarConfig;
+    use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+
+    const EGO_MPS: f64 = 30.0;
+    const EGO_S_M: f64 = 1_000.0;
+
+    fn radars(text: &str, seed: u64) -> RearRadars {
+        let model = toml::from_str::<RearRadarConfig>(text).unwrap().check(&Parameters::default()).unwrap();
+        RearRadars::new(model, &NoiseKey { seed, sample: 1, ego: ActorId::new("ego").unwrap(), actors: [].into() })
+    }
+
+    /// Returns a scene with one car behind the ego.
+    fn scene<'a>(road: &'a Road, others: &'a [SceneVehicle], time: Time) -> Scene<'a> {
+        let ego = with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), EGO_MPS);
+        Scene { time, road, environment: &Environment::CLEAR_DAY, ego, others }
+    }
+
+    /// Returns the detections of the left and of the right radar in so many scans of one scene.
+    fn detections(
+        radars: &mut RearRadars,
+        road: &Road,
+        others: &[SceneVehicle],
+        scans: i64,
+    ) -> [Vec<RadarDetection>; 2] {
+        let mut all = [Vec::new(), Vec::new()];
+        // A scan is due in every second step.
+        for step in 0..2 * scans {
+            let scene = scene(road, others, CONTROL_STEP * step);
+            radars.sense([&scene, &scene], 0).unwrap();
+            radars.pass_due(0, None, |scan| {
+                for (all, detections) in all.iter_mut().zip(scan.detections) {
+                    all.extend_from_slice(detections);
+                }
+            });
+        }
+        all
+    }
+
+    /// Returns a car in the left lane, 50 m behind the ego.
+    fn car(speed_mps: f64) -> SceneVehicle {
+        with_speed(scene_vehicle(1, VehicleClass::Car, EGO_S_M - 50.0, OWN_LANE_M + 3.75), speed_mps)
+    }
+
+    /// Returns what the left radar measures of the first vehicle without errors.
+    fn true_echo(radars: &RearRadars, road: &Road, others: &[SceneVehicle]) -> Echo {
+        let scene = scene(road, others, Time::ZERO);
+        let mut surroundings = Vec::new();
+        transform_scene(&scene, &mut surroundings).unwrap();
+        let mount = radars.model.mount(Side::Left, scene.ego.vehicle.dimensions.length_m);
+        mount.echo(&mount.nearest_point(&surroundings[0]), EGO_MPS, radars.model.range_m).unwrap()
+    }
+
+    #[test]
+    fn errors_have_the_stated_spread_and_no_bias() {
+        let (mut radars, road) = (radars("detection-probability = 1.0", 3), Road::straight(3));
+        let truth = true_echo(&radars, &road, &[car(38.0)]);
+        assert!(truth.radial_mps < -7.9 && truth.radial_mps > -8.0, "{truth:?}");
+        let [measured, _] = detections(&mut radars, &road, &[car(38.0)], 10_000);
+        assert_eq!(measured.len(), 10_000, "each scan detects the car");
+        let model = radars.model;
+        let columns: [(fn(&RadarDetection) -> f64, f64, f64); 3] = [
+            (|detection| detection.range_m, truth.range_m, model.range_sd_m),
+            (|detection| detection.azimuth_rad, truth.azimuth_rad, model.azimuth_sd_rad),
+            (|detection| detection.radial_mps, truth.radial_mps, model.speed_sd_mps),
+        ];
+        for (value, truth, sd) in columns {
+            let errors: Vec<f64> = measured.iter().map(|detection| value(detection) - truth).collect();
+            let count = errors.len() as f64;
+            let mean = errors.iter().sum::<f64>() / count;
+            let spread = (errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt();
+            // Four standard errors of the mean and of the standard deviation of 10,000 draws.
+            assert!(mean.abs() < 0.04 * sd && (spread / sd - 1.0).abs() < 0.03, "{mean} {spread} for {sd}");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_is_detected_with_the_stated_probability() {
+        let mut radars = radars("detection-probability = 0.6", 5);
+        let [measured, _] = detections(&mut radars, &Road::straight(3), &[car(38.0)], 10_000);
+        // Four standard errors.
+        assert!((measured.len() as f64 / 10_000.0 - 0.6).abs() < 0.02, "{}", measured.len());
+    }
+
+    #[test]
+    fn ghosts_lie_beyond_the_rail_and_come_with_the_stated_probability() {
+        let road = Road::straight(3).with_guard_rails();
+        let text = "detection-probability = 1.0\nghost-probability = 0.2\nrange-sd-m = 0.01\nazimuth-sd-deg = 0.01\n";
+        let mut radars = radars(text, 7);
+        let [measured, _] = detections(&mut radars, &road, &[car(38.0)], 5_000);
+        let left_m = |detection: &RadarDetection| {
+            OWN_LANE_M
+                + detection.sensor_m[1]
+                + detection.range_m * closecall_traffic::maths::sin(detection.azimuth_rad)
+        };
+        let [left_rail_m, right_rail_m] = rails_m(&road);
+        let direct = measured.iter().filter(|at| (right_rail_m..left_rail_m).contains(&left_m(at))).count();
+        assert_eq!(direct, 5_000, "one detection of the car in each scan");
+        // The side of the car that faces the radar is 2.15 m to the left of it.
+        let side_m = OWN_LANE_M + 3.75 - 0.5 * car(38.0).vehicle.dimensions.width_m;
+        for rail_m in [left_rail_m, right_rail_m] {
+            let image_m = 2.0 * rail_m - side_m;
+            let ghosts = measured.iter().filter(|at| (left_m(at) - image_m).abs() < 0.2).count();
+            // Four standard errors of 5,000 draws.
+            assert!((ghosts as f64 / 5_000.0 - 0.2).abs() < 0.023, "{ghosts} at {image_m} m");
+        }
+        let [without_rails, _] = detections(&mut radars, &Road::straight(3), &[car(38.0)], 100);
+        assert_eq!(without_rails.len(), 100, "nothing mirrors without a rail");
+    }
+
+    #[test]
+    fn another_vehicle_changes_no_error_of_the_first() {
+        let road = Road::straight(3);
+        let other = with_speed(scene_vehicle(2, VehicleClass::Car, EGO_S_M - 30.0, OWN_LANE_M - 3.75), 30.0);
+        // The angle tells the two apart.
+        let text = "azimuth-sd-deg = 0.1";
+        let [alone, _] = detections(&mut radars(text, 9), &road, &[car(38.0)], 200);
+        let [both, _] = detections(&mut radars(text, 9), &road, &[car(38.0), other], 200);
+        let of_car: Vec<_> = both.into_iter().filter(|detection| detection.azimuth_rad > 0.0).collect();
+        assert_eq!(alone, of_car);
+    }
+
+    #[test]
+    fn a_mirrored_scene_has_mirrored_errors() {
+        let road = Road::straight(3);
+        let mirrored_car = with_speed(scene_vehicle(1, VehicleClass::Car, EGO_S_M - 50.0, OWN_LANE_M - 3.75), 38.0);
+        let [left, _] = detections(&mut radars("", 9), &road, &[car(38.0)], 100);
+        let [_, right] = detections(&mut radars("", 9), &road.mirrored().unwrap(), &[mirrored_car], 100);
+        assert_eq!(left.len(), right.len());
+        for (left, right) in left.iter().zip(&right) {
+            assert!((left.azimuth_rad + right.azimuth_rad).abs() < 1e-12, "{left:?} {right:?}");
+            assert!((left.range_m - right.range_m).abs() < 1e-9 && (left.radial_mps - right.radial_mps).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_dead_a_blocked_and_a_dirty_radar_detect_what_they_still_can() {
+        let road = Road::straight(3);
+        let seen = |fault: RadarFault| {
+            let list = FaultList::throughout_of(fault);
+            let mut radars = radars("detection-probability = 1.0", 1).with_faults(list);
+            let counts = detections(&mut radars, &road, &[car(38.0)], 100).map(|all| all.len());
+            (counts, radars.has_failed())
+        };
+        let usual = RadarFault::default();
+        assert_eq!(seen(usual), ([100, 100], false));
+        assert_eq!(seen(RadarFault { is_dead: true, ..usual }), ([0, 0], true));
+        assert_eq!(seen(RadarFault { is_dead: true, side: Some(Side::Left), ..usual }), ([0, 100], true));
+        // The car is 45 m behind, 3 m to the left.
+        let blocked = |from_deg, to_deg| RadarFault::default().with_blocked(from_deg, to_deg);
+        assert_eq!(seen(blocked(0.0, 10.0)), ([0, 0], false));
+        assert_eq!(seen(blocked(-10.0, 0.0)), ([100, 100], false));
+        assert_eq!(seen(RadarFault { range_share: 0.4, ..usual }), ([0, 0], false));
+        let ([left, _], _) = seen(RadarFault { dropout: 0.5, ..usual });
+        assert!((30..=70).contains(&left), "{left}");
+    }
+}
