@@ -7,7 +7,7 @@
 //!   boxes of the detections ─┘                     └▶ camera only: a place on the road
 //! ```
 
-use crate::camera::{FOCAL_PX, Instance, RearCamera, is_beside_road, overlap};
+use crate::camera::{Instance, RearCamera, is_beside_road, overlap};
 use crate::tracking::LaneGeometry;
 use closecall_traffic::{ClassScores, Time, maths};
 
@@ -157,7 +157,7 @@ fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detecti
     let depth_m = camera.depth_m(ego, detection.face_x_m)?;
     let middle = 0.5 * f64::from(crate::camera::WIDTH_PX);
     // Rays to the right of the middle of the image have positive slopes, to the ego's left.
-    let [low, high] = [left, right].map(|edge| (edge - middle) / FOCAL_PX);
+    let [low, high] = [left, right].map(|edge| (edge - middle) / camera.camera().focal_px);
     let at = |slope: f64, is_inner: bool| slope * if is_inner { depth_m + detection.length_m } else { depth_m };
     let width_m = at(high, high < 0.0) - at(low, low > 0.0);
     WIDTHS_M.contains(&width_m).then_some(width_m)
@@ -173,9 +173,10 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
     let ([x_m, y_m], below) = camera.on_ground(&scene.ego, [0.5 * (left + right), bottom])?;
     let depth_m = camera.depth_m(&scene.ego, x_m).filter(|depth_m| *depth_m <= MAX_ALONE_M)?;
     let typical = instance.class.typical_dimensions();
-    let width_m = (right - left) / FOCAL_PX * depth_m;
+    let focal_px = camera.camera().focal_px;
+    let width_m = (right - left) / focal_px * depth_m;
     // The distance is h / tan β: its derivative by β is −h / sin² β, which is about d / tan β.
-    let range_sd_m = depth_m / below * maths::hypot(ROW_SD_PX / FOCAL_PX, PITCH_SD_RAD);
+    let range_sd_m = depth_m / below * maths::hypot(ROW_SD_PX / focal_px, PITCH_SD_RAD);
     let mut scores = [0.0; 4];
     (scores[instance.class as usize], scores[ClassScores::BACKGROUND]) = (instance.score, 1.0 - instance.score);
     let detection = Detection {
@@ -183,7 +184,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         face_x_m: x_m,
         face_y_m: y_m,
         range_sd_m,
-        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / FOCAL_PX, y_m / depth_m * range_sd_m),
+        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / focal_px, y_m / depth_m * range_sd_m),
         heading_rad: lane.direction_rad(x_m),
         length_m: typical.length_m,
         length: Extent::Assumed,

@@ -1,12 +1,22 @@
 //! The configuration of the rear camera: the text in a scenario file, and its checked form.
 
-use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 use super::optics::{LensConfig, Optics};
+use super::picture::{FIELD_OF_VIEW_RAD, FOCAL_PX, WIDTH_PX};
 use crate::kept::kept;
+
+/// Horizontal field of view of the usual camera (deg), with which the networks were trained.
+const FIELD_OF_VIEW_DEG: f64 = 60.0;
+/// Difference from it that is due to rounding (deg).
+const ROUNDING_DEG: f64 = 1e-9;
+
+fn is_usual_field(number: &Num) -> bool {
+    *number == Num::Fixed(FIELD_OF_VIEW_DEG)
+}
 
 /// The processing of the camera's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -58,6 +68,10 @@ pub struct CameraConfig {
     pub mount_from_rear_m: Num,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: Num,
+    /// Horizontal field of view (deg) of the 1280 columns of the image. The networks that ship were
+    /// trained with 60°. Default: 60.
+    #[serde(skip_serializing_if = "is_usual_field")]
+    pub field_of_view_deg: Num,
     /// Root mean square of the angular rate of the camera's vibration (rad/s). Vibration blurs long
     /// exposures.
     pub vibration_radps: Num,
@@ -87,6 +101,7 @@ impl Default for CameraConfig {
             mount_height_m: Num::Fixed(1.2),
             mount_from_rear_m: Num::Fixed(0.6),
             pitch_rad: Num::Fixed(0.03),
+            field_of_view_deg: Num::Fixed(FIELD_OF_VIEW_DEG),
             vibration_radps: Num::Fixed(0.05),
             dirt: Num::Fixed(0.05),
             exposure_ev: Num::Fixed(0.0),
@@ -122,6 +137,11 @@ pub struct Camera {
     pub mount_from_rear_m: f64,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: f64,
+    /// Horizontal field of view (rad).
+    pub field_of_view_rad: f64,
+    /// Focal length (px): half of the width of the image over the tangent of half of the field of
+    /// view.
+    pub focal_px: f64,
     /// Root mean square of the angular rate of the camera's vibration (rad/s).
     pub vibration_radps: f64,
     /// Share of the rear window that is soiled (0 to 1).
@@ -149,6 +169,14 @@ impl Check for CameraConfig {
         let number = |num, key, low, high| parameters.number(num, key, Range::closed(low, high));
         let half_turn = std::f64::consts::PI;
         let sun = |error: ConfigError| error.within("sun");
+        let field_deg = number(&self.field_of_view_deg, "field-of-view-deg", 20.0, 120.0)?;
+        let (field_of_view_rad, focal_px) = match (field_deg - FIELD_OF_VIEW_DEG).abs() <= ROUNDING_DEG {
+            true => (FIELD_OF_VIEW_RAD, FOCAL_PX),
+            false => {
+                let field_rad = field_deg.to_radians();
+                (field_rad, f64::from(WIDTH_PX) / 2.0 / maths::tan(field_rad / 2.0))
+            }
+        };
         Ok(Camera {
             pipeline: parameters.word(&self.pipeline, "pipeline")?,
             model: self.model.as_deref().map(kept),
@@ -156,6 +184,8 @@ impl Check for CameraConfig {
             mount_height_m: number(&self.mount_height_m, "mount-height-m", 0.4, 3.5)?,
             mount_from_rear_m: number(&self.mount_from_rear_m, "mount-from-rear-m", 0.0, 3.0)?,
             pitch_rad: number(&self.pitch_rad, "pitch-rad", -0.2, 0.3)?,
+            field_of_view_rad,
+            focal_px,
             vibration_radps: number(&self.vibration_radps, "vibration-radps", 0.0, 1.0)?,
             dirt: parameters.number(&self.dirt, "dirt", Range::UNIT)?,
             exposure_ev: number(&self.exposure_ev, "exposure-ev", -3.0, 3.0)?,

@@ -9,7 +9,7 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 
 /// Tangent of the angle to the axis up to which the polynomial of the distortion holds: just beyond
 /// the corners of the image, which lie at 0.68. Farther out the distortion continues linearly.
@@ -134,10 +134,10 @@ impl Optics {
 
     /// Returns the bounds in the distorted image of a rectangle `[left, top, right, bottom]` of the
     /// ideal image (px).
-    pub(crate) fn bounds(&self, [left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
+    pub(crate) fn bounds(&self, [left, top, right, bottom]: [f64; 4], focal_px: f64) -> [f64; 4] {
         let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
         let tangents = |low: f64, high: f64, axis: usize| {
-            let [low, high] = [low, high].map(|at| (at - centre[axis]) / FOCAL_PX);
+            let [low, high] = [low, high].map(|at| (at - centre[axis]) / focal_px);
             // A line of the rectangle deviates most at its ends, or where it is nearest to the
             // axis.
             [low, 0.0_f64.clamp(low, high.max(low)), high]
@@ -147,7 +147,7 @@ impl Optics {
         for x in columns {
             for y in rows {
                 let [x, y] = self.distorted([x, y]);
-                let [u, v] = [centre[0] + FOCAL_PX * x, centre[1] + FOCAL_PX * y];
+                let [u, v] = [centre[0] + focal_px * x, centre[1] + focal_px * y];
                 bounds = [bounds[0].min(u), bounds[1].min(v), bounds[2].max(u), bounds[3].max(v)];
             }
         }
@@ -166,6 +166,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::camera::FOCAL_PX;
 
     fn lens(k1: f64, k2: f64) -> Result<Optics, ConfigError> {
         let config =
@@ -194,7 +195,7 @@ mod tests {
                 let pixel = |[x, y]: [f64; 2]| [640.0 + FOCAL_PX * x, 400.0 + FOCAL_PX * y];
                 let [left, top] = pixel(corner);
                 let [right, bottom] = pixel([corner[0] + size[0], corner[1] + size[1]]);
-                let bounds = lens.bounds([left, top, right, bottom]);
+                let bounds = lens.bounds([left, top, right, bottom], FOCAL_PX);
                 let [u, v] = pixel(lens.distorted([corner[0] + at[0] * size[0], corner[1] + at[1] * size[1]]));
                 prop_assert!(bounds[0] - 1e-6 <= u && u <= bounds[2] + 1e-6, "{u} in {bounds:?}");
                 prop_assert!(bounds[1] - 1e-6 <= v && v <= bounds[3] + 1e-6, "{v} in {bounds:?}");

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   ground frame G                          image
-//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px = 60°
+//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px = 60° (`field-of-view-deg`)
 //!   x along the ego's heading, y left, z up   │
 //!                                             ▼ v, 800 px
 //!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
@@ -16,7 +16,7 @@ use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::Camera;
 use super::optics::Optics;
-use super::picture::{FIELD_OF_VIEW_RAD, HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 
 /// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body
 /// lies there.
@@ -85,6 +85,8 @@ impl GroundBox {
 pub(crate) struct Lens {
     /// Focal length (px).
     pub(crate) focal_px: f64,
+    /// The same, up to rounding, as the camera states it (px).
+    stated_focal_px: f64,
     /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind
     /// the centre.
     pub(crate) ahead_m: f64,
@@ -108,7 +110,8 @@ impl Lens {
         // higher.
         let pitch = camera.pitch_rad - ego.pitch_rad;
         Self {
-            focal_px: f64::from(WIDTH_PX) / 2.0 / maths::tan(FIELD_OF_VIEW_RAD / 2.0),
+            focal_px: f64::from(WIDTH_PX) / 2.0 / maths::tan(camera.field_of_view_rad / 2.0),
+            stated_focal_px: camera.focal_px,
             ahead_m,
             height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
             sin_pitch: maths::sin(pitch),
@@ -200,7 +203,8 @@ impl Lens {
             }
         }
         let is_visible = bounds[0] <= bounds[2];
-        is_visible.then(|| if self.optics.is_straight() { bounds } else { self.optics.bounds(bounds) })
+        is_visible
+            .then(|| if self.optics.is_straight() { bounds } else { self.optics.bounds(bounds, self.stated_focal_px) })
     }
 }
 
@@ -211,10 +215,15 @@ mod tests {
     use super::*;
     use crate::camera::CameraConfig;
     use crate::camera::FOCAL_PX;
+    use crate::camera::picture::FIELD_OF_VIEW_RAD;
     use closecall_traffic::{Check, Parameters};
 
     fn lens(pitch_rad: f64) -> Lens {
-        let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+        lens_of(&CameraConfig::default(), pitch_rad)
+    }
+
+    fn lens_of(config: &CameraConfig, pitch_rad: f64) -> Lens {
+        let camera = config.check(&Parameters::default()).unwrap();
         let ego = SceneVehicle {
             actor: 0,
             vehicle: Vehicle::typical(VehicleClass::Car),
@@ -243,6 +252,21 @@ mod tests {
         let lens = lens(0.0);
         let [u, _] = lens.pixel([10.0 * maths::tan(FIELD_OF_VIEW_RAD / 2.0), 0.0, 10.0]);
         assert!((u - f64::from(WIDTH_PX)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_wider_field_of_view_shows_more_and_shows_it_smaller() {
+        use closecall_traffic::Num;
+        for field_deg in [30.0, 90.0_f64, 120.0] {
+            let config = CameraConfig { field_of_view_deg: Num::Fixed(field_deg), ..CameraConfig::default() };
+            let lens = lens_of(&config, 0.0);
+            let [u, _] = lens.pixel([10.0 * maths::tan(0.5 * field_deg.to_radians()), 0.0, 10.0]);
+            assert!((u - f64::from(WIDTH_PX)).abs() < 1e-9, "{u} at {field_deg}°");
+            assert!((lens.focal_px - lens.stated_focal_px).abs() < 1e-9);
+        }
+        let config = CameraConfig { field_of_view_deg: Num::Fixed(130.0), ..CameraConfig::default() };
+        let error = config.check(&Parameters::default()).unwrap_err().to_string();
+        assert_eq!(error, "`field-of-view-deg` is 130, but a number from 20 to 120 is needed");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::fault::CameraFault;
 use super::instance::Instance;
 use super::labels::LabelMap;
 use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
-use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, WIDTH_PX};
 use super::pinhole::Lens;
 use super::pipeline::ground_box;
 use super::{Camera, CameraConfig, ExposureKey, Frame, FrameBuffers, PixelRect, RearCamera};
@@ -126,7 +126,8 @@ impl RearCamera {
     /// `None` above the horizon.
     pub fn on_ground(&self, ego: &SceneVehicle, [u, v]: [f64; 2]) -> Option<([f64; 2], f64)> {
         let lens = Lens::new(self.camera(), ego);
-        let mut at = [(u - f64::from(WIDTH_PX) / 2.0) / FOCAL_PX, (v - f64::from(HEIGHT_PX) / 2.0) / FOCAL_PX];
+        let focal_px = self.camera().focal_px;
+        let mut at = [(u - f64::from(WIDTH_PX) / 2.0) / focal_px, (v - f64::from(HEIGHT_PX) / 2.0) / focal_px];
         if !lens.optics.is_straight() {
             at = lens.optics.undistorted(at);
         }

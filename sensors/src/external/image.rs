@@ -3,7 +3,7 @@
 use closecall_traffic::{Stream, Time};
 
 use super::settings::ImageSettings;
-use crate::camera::{Camera, CameraFault, ExposureKey, FOCAL_PX, Frame, FrameBuffers, PixelRect, Sampling};
+use crate::camera::{Camera, CameraFault, ExposureKey, Frame, FrameBuffers, PixelRect, Sampling};
 use crate::faults::FaultList;
 use crate::worker_classifier::{CHANNEL, HeldImage};
 use crate::{NoiseKey, Scene};
@@ -48,7 +48,7 @@ impl CameraMount {
             x_m: -0.5 * ego_length_m + camera.mount_from_rear_m,
             z_m: camera.mount_height_m,
             pitch_rad: camera.pitch_rad,
-            focal_px: FOCAL_PX / f64::from(settings.step),
+            focal_px: camera.focal_px / f64::from(settings.step),
             distortion: camera.optics.distortion,
             size_px: [sampling.columns().len(), sampling.rows().len()],
             period_s: settings.period.s(),

@@ -10,7 +10,7 @@
 //! every image of the Mask R-CNN is one that the network evaluated.
 
 use closecall_sensors::camera::{
-    Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
+    Camera, ExposureKey, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
 };
 use closecall_sensors::rear_exposures;
 use closecall_traffic::{Time, VehicleClass, maths};
@@ -53,7 +53,7 @@ fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<()
     let (step, first_row) = (f32::from(PIXEL_STEP), f32::from(PIXEL_ROWS.start));
     let rows = f32::from(PIXEL_ROWS.end) - first_row;
     let [width, height] = [PixelRect::IMAGE.width as f32, PixelRect::IMAGE.height as f32];
-    let focal = FOCAL_PX as f32 / step;
+    let focal = camera.focal_px as f32 / step;
     let pinhole = Pinhole::from_focal_length_and_resolution([focal, focal], [width / step, rows / step])
         .with_principal_point([0.5 * width / step, (0.5 * height - first_row) / step])
         .with_image_plane_distance(IMAGE_DISTANCE_M);
