@@ -92,15 +92,15 @@ impl Mount {
         let (from_m, to_m) = (in_body(self.at_m), in_body(point.at_m));
         let half_m = [0.5 * other.length_m, 0.5 * other.width_m];
         let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
-        for axis in 0..2 {
-            let step_m = to_m[axis] - from_m[axis];
+        for ((from_m, to_m), half_m) in from_m.into_iter().zip(to_m).zip(half_m) {
+            let step_m = to_m - from_m;
             if step_m == 0.0 {
-                if from_m[axis].abs() > half_m[axis] {
+                if from_m.abs() > half_m {
                     return false;
                 }
                 continue;
             }
-            let ends = [-half_m[axis], half_m[axis]].map(|end_m| (end_m - from_m[axis]) / step_m);
+            let ends = [-half_m, half_m].map(|end_m| (end_m - from_m) / step_m);
             enters = enters.max(ends[0].min(ends[1]));
             leaves = leaves.min(ends[0].max(ends[1]));
         }

@@ -146,8 +146,8 @@ impl RearRadars {
             self.dead_scans[index] = if is_dead { self.dead_scans[index].saturating_add(1) } else { 0 };
             let mount = self.model.mount(side, scene.ego.vehicle.dimensions.length_m);
             let view = View { scene, frame: &frame, others: &others[..], mount, fault };
-            for place in 0..others.len() {
-                let target = self.target(others[place].actor);
+            for (place, other) in view.others.iter().enumerate() {
+                let target = self.target(other.actor);
                 let draws = self.targets[target].draw(usize::from(side != passing));
                 self.detect(view, place, draws, &mut detections[index]);
             }
