@@ -94,7 +94,12 @@ impl Attribute {
             let value = values.get(parameter).map(str::to_owned);
             return value.ok_or_else(|| format!("`{name}`: {}", values.unknown(parameter)));
         }
-        let value = resolve(text, values).map_err(|message| format!("`{name}`: {message}"))?;
+        let value = match resolve(text, values) {
+            // Programs compose names of texts, such as `${Brake + _ + $Number}`: no other element
+            // refers to such a name.
+            Err(_) if name == "name" && text.trim_start().starts_with("${") => return Ok(text.to_owned()),
+            value => value.map_err(|message| format!("`{name}`: {message}"))?,
+        };
         let number = || match value.trim().parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
             _ => Err(format!("`{name}` is `{value}`; a number is needed")),

@@ -1,9 +1,6 @@
-//! The checked faults of each sensor, and which of them hold at an instant.
+//! The checked faults of one sensor, and which of them hold at an instant.
 
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Side, Time};
-
-use super::{LidarFault, ObjectFault, OdometryErrors, RadarFault};
-use crate::camera::CameraFault;
+use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
 
 /// Maximum number of entries of one sensor.
 const MAX_ENTRIES: usize = 4;
@@ -80,9 +77,14 @@ impl<T: Combine> FaultList<T> {
     }
 
     /// Returns the same entries, each from before the start of the run to its end.
-    fn throughout(self) -> Self {
+    pub(super) fn throughout(self) -> Self {
         let always = |entry: Entry<T>| Entry { from_s: f64::NEG_INFINITY, until_s: f64::INFINITY, ..entry };
         Self { entries: self.entries.map(|entry| entry.map(always)) }
+    }
+
+    /// Returns the entries with the effects that `keeps` keeps.
+    pub(super) fn only(self, keeps: impl Fn(&T) -> bool) -> Self {
+        Self { entries: self.entries.map(|entry| entry.filter(|entry| keeps(&entry.effect))) }
     }
 
     /// Returns the effect of each entry with its begin and its end (s).
@@ -102,29 +104,6 @@ impl<T: Combine> FaultList<T> {
 
     fn held(&self, time_s: f64) -> impl Iterator<Item = &Entry<T>> {
         self.entries.iter().flatten().filter(move |entry| entry.from_s <= time_s && time_s < entry.until_s)
-    }
-}
-
-impl FaultList<LidarFault> {
-    /// Returns the entries of the sensor with this name: the entries that name it, and the entries
-    /// that name no sensor.
-    pub(crate) fn of_sensor(self, name: &str) -> Self {
-        let is_own = |entry: &Entry<LidarFault>| entry.effect.sensor.is_none_or(|sensor| sensor == name);
-        Self { entries: self.entries.map(|entry| entry.filter(is_own)) }
-    }
-
-    /// Returns the names of sensors that the entries have.
-    pub(crate) fn sensors(&self) -> impl Iterator<Item = &'static str> + use<> {
-        self.entries.into_iter().flatten().filter_map(|entry| entry.effect.sensor)
-    }
-}
-
-impl FaultList<RadarFault> {
-    /// Returns the entries of the radar on this side: the entries that name it, and the entries
-    /// that name no side.
-    pub(crate) fn of_side(self, side: Side) -> Self {
-        let is_own = |entry: &Entry<RadarFault>| entry.effect.side.is_none_or(|of| of == side);
-        Self { entries: self.entries.map(|entry| entry.filter(is_own)) }
     }
 }
 
@@ -150,48 +129,4 @@ pub(super) fn check_span([from, until]: [&Option<Num>; 2], parameters: &Paramete
         return Err(ConfigError::new("until-s", Problem::Contradiction { other: "from-s", rule }));
     }
     Ok(span)
-}
-
-/// The checked faults of all sensors. None by default.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Faults {
-    pub(crate) rear_lidar: FaultList<LidarFault>,
-    pub(crate) front_lidar: FaultList<LidarFault>,
-    pub(crate) rear_camera: FaultList<CameraFault>,
-    pub(crate) front_radar: FaultList<ObjectFault>,
-    pub(crate) surround: FaultList<ObjectFault>,
-    pub(crate) rear_object: FaultList<ObjectFault>,
-    pub(crate) rear_radar: FaultList<RadarFault>,
-    /// The errors of the ego's odometry and map.
-    pub odometry: OdometryErrors,
-}
-
-impl Faults {
-    /// Returns whether a fault concerns the sensors that look back, or the odometry and the map
-    /// that all sensors depend on.
-    pub fn concern_rear(&self) -> bool {
-        let has_sensor = !(self.rear_lidar.is_empty() && self.rear_camera.is_empty() && self.rear_object.is_empty());
-        has_sensor || !self.rear_radar.is_empty() || !self.odometry.is_none()
-    }
-
-    /// Returns whether odometry and map are all that is wrong: such faults act in each mode of the
-    /// sensors.
-    pub fn concern_odometry_only(&self) -> bool {
-        !self.odometry.is_none() && *self == Self { odometry: self.odometry, ..Self::default() }
-    }
-
-    /// Returns the same faults, each from before the start of the run to its end.
-    #[must_use]
-    pub fn throughout(self) -> Self {
-        Self {
-            rear_lidar: self.rear_lidar.throughout(),
-            front_lidar: self.front_lidar.throughout(),
-            rear_camera: self.rear_camera.throughout(),
-            front_radar: self.front_radar.throughout(),
-            surround: self.surround.throughout(),
-            rear_object: self.rear_object.throughout(),
-            rear_radar: self.rear_radar.throughout(),
-            odometry: self.odometry.throughout(),
-        }
-    }
 }

@@ -24,6 +24,7 @@ mod config;
 mod list;
 mod object;
 mod odometry;
+mod of_all_sensors;
 mod radar;
 mod sector;
 #[cfg(test)]
@@ -32,9 +33,9 @@ mod words;
 
 pub use config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
 pub(crate) use list::FaultList;
-pub use list::Faults;
 pub(crate) use odometry::Belief;
 pub use odometry::{OdometryErrorConfig, OdometryErrors};
+pub use of_all_sensors::Faults;
 pub(crate) use words::ActingSensors;
 pub use words::{SensorGroup, StatedFault};
 

@@ -18,8 +18,10 @@
 
 use closecall_traffic::{ConfigError, KeyPath, Problem, Range};
 
-use super::kind::{MAX_BEAMS, MAX_ELEVATION_DEG};
-
+/// Greatest elevation of a beam (°).
+pub(super) const MAX_ELEVATION_DEG: f64 = 45.0;
+/// Greatest number of beams in a scan: beams are numbered with 16 bits.
+pub(super) const MAX_BEAMS: usize = 65_535;
 /// The first line of a table.
 const HEADER: &str = "azimuth_deg,elevation_deg,time_offset_us";
 /// The key of a table in a pattern.

@@ -17,7 +17,7 @@ use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Probl
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::beam_table::{self, BeamFileError, BeamLimits, BeamTable};
+use super::beam_table::{self, BeamFileError, BeamLimits, BeamTable, MAX_BEAMS, MAX_ELEVATION_DEG};
 use super::pattern::{GROUPS, mirror_bounds_deg};
 use super::{LidarModel, MirrorSide};
 
@@ -33,10 +33,6 @@ const USUAL_POWER: f64 = 2.25;
 const SD_DECIMALS: f64 = 1e4;
 /// Greatest number of layers.
 pub(super) const MAX_LAYERS: usize = 128;
-/// Greatest elevation of a layer (°).
-pub(super) const MAX_ELEVATION_DEG: f64 = 45.0;
-/// Greatest number of beams in a scan: beams are numbered with 16 bits.
-pub(super) const MAX_BEAMS: usize = 65_535;
 /// Greatest difference from a whole number of azimuth steps (steps).
 const STEP_TOLERANCE: f64 = 1e-6;
 /// Number of columns at either end of the field of view. A cluster with a point in one of them may

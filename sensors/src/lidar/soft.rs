@@ -348,9 +348,8 @@ impl AirColumn<'_> {
                     }
                 }
             }
-            for (lane, may) in may.into_iter().enumerate() {
-                mask |= LayerMask::from(may) << (first + lane);
-            }
+            let lanes = may.into_iter().enumerate().fold(0, |lanes, (lane, may)| lanes | u32::from(may) << lane);
+            mask |= LayerMask::from(lanes) << first;
         }
         mask & layers_below(self.layers)
     }
