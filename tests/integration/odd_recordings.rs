@@ -142,6 +142,28 @@ fn traffic_against_the_axis_of_the_road_is_refused_by_the_direction() {
 }
 
 #[test]
+fn times_that_jitter_are_read_and_mixed_steps_are_refused_without_advice_to_drop_rows() {
+    let folder = folder();
+    let clean = recorded(folder.path());
+    let whole = lane_changes(&clean, &[]).0.len();
+    let moved = |name: &str, late_s: &dyn Fn(f64) -> f64| {
+        changed(&clean, &folder.path().join(name), |row| {
+            let time_s = row("time_s") + 1.0 + late_s(row("frame"));
+            vec![("time_s", (time_s * 1_000.0).round() / 1_000.0)]
+        })
+    };
+    let jitter = moved("jitter.csv", &|frame| 0.003 * (12.9898 * frame).sin());
+    assert_eq!(lane_changes(&jitter, &[]).0.len(), whole);
+    // Steps of 65 and of 15 ms take turns.
+    let mixed = moved("mixed.csv", &|frame| 0.05 * (frame / 2.0).fract());
+    let message = refusal(&mixed, &[]);
+    assert!(message.contains("follow no clock") && !message.contains("--drop-bad-rows"), "{message}");
+    // After half of the frames, one is missing, but the numbers go on.
+    let missing = moved("missing.csv", &|frame| if frame >= 60.0 { 1.0 } else { 0.0 });
+    assert!(refusal(&missing, &[]).contains("goes on by"));
+}
+
+#[test]
 fn a_heading_or_a_position_in_the_plane_against_the_lateral_position_is_refused() {
     let folder = folder();
     let clean = recorded(folder.path());

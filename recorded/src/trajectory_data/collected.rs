@@ -30,6 +30,12 @@ const MAX_ROWS: usize = 20_000_000;
 /// Shortest step between two frames: shorter ones are the rounding of a file.
 const SHORTEST_STEP: Time = Time::from_ms(1);
 
+/// One in this number of steps is the least share of the most frequent one. If times jitter, no step is
+/// frequent, and the median step counts.
+const RARE: usize = 10;
+/// Share of a step by which steps may differ before their mean is taken (-), as in `assemble`.
+const UNEVENNESS: f64 = 0.02;
+
 /// Lateral movement within one step that makes a lane change a jump (m): half a narrow lane.
 const JUMP_M: f64 = 1.5;
 /// Lateral speed of such a jump (m/s): twice that of the fastest lane changes.
@@ -246,9 +252,11 @@ fn steps(span: Time, period: Time) -> i64 {
     (span.ns() + period.ns() / 2).div_euclid(period.ns())
 }
 
-/// Returns the most frequent time between two successive rows of a vehicle.
+/// Returns the time between two frames: the most frequent one between two successive rows of a vehicle,
+/// or the mean of such times, if they are rounded or jitter.
 fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    let mut steps_us: Vec<i64> = Vec::new();
     for pair in order.windows(2) {
         let (before, after) = (&rows[pair[0]], &rows[pair[1]]);
         let step = after.time - before.time;
@@ -256,10 +264,21 @@ fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
             // Times since 1970 are accurate to a microsecond.
             let microseconds = (step.ns() + 500) / 1_000;
             *counts.entry(microseconds).or_default() += 1;
+            steps_us.push(microseconds);
         }
     }
     let usual = counts.into_iter().rev().max_by_key(|(_, count)| *count);
-    usual.map_or(Time::from_ms(1_000), |(microseconds, _)| Time::from_ns(1_000 * microseconds))
+    let Some((usual_us, count)) = usual else { return Time::from_ms(1_000) };
+    let middle = steps_us.len() / 2;
+    let is_rare = RARE * count < steps_us.len();
+    let usual_us = if is_rare { *steps_us.select_nth_unstable(middle).1 } else { usual_us };
+    // Longer steps are gaps.
+    steps_us.retain(|step_us| 2 * step_us > usual_us && 2 * step_us < 3 * usual_us);
+    let is_uneven = |step_us: &i64| (step_us - usual_us).abs() as f64 > UNEVENNESS * usual_us as f64;
+    if !steps_us.iter().any(is_uneven) {
+        return Time::from_ns(1_000 * usual_us);
+    }
+    Time::from_ns(1_000 * steps_us.iter().sum::<i64>() / steps_us.len().max(1) as i64)
 }
 
 /// Infers the road, if positions lie in a plane.

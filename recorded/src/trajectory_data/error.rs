@@ -200,6 +200,18 @@ pub enum TrajectoryFileProblem {
         /// Time between the two rows that their frame numbers require (s).
         needed_s: f64,
     },
+    /// Many time steps contradict the frame numbers.
+    #[error(
+        "{first}; {uneven} of {steps} steps between frames are uneven: the times follow no clock, and no rows can be left out"
+    )]
+    IrregularClock {
+        /// Problem with the first of them.
+        first: Box<TrajectoryFileProblem>,
+        /// Number of uneven steps.
+        uneven: usize,
+        /// Number of steps.
+        steps: usize,
+    },
     /// Time decreases or stands still in a log of one vehicle.
     #[error("is {time_s}, after {before_s} in the row before, but time has to go on from row to row")]
     TimeBackwards {

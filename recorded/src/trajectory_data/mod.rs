@@ -71,6 +71,7 @@ mod exid;
 mod fields;
 mod file_layout;
 mod file_set;
+mod frame_times;
 mod header;
 mod highd;
 mod i24;

@@ -13,6 +13,7 @@ use super::data::{RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::estimated_lanes::EstimatedLanes;
 use super::file_layout::Layout;
+use super::frame_times::{self, Ticks};
 use super::input::Digest;
 use super::lane_spacing;
 use super::markings::LaneMarkings;
@@ -149,6 +150,8 @@ pub struct Tracks<'a> {
     /// Rows of the window that are not yet in the builder, in their documented directions.
     window: std::vec::IntoIter<Row>,
     period: Time,
+    /// The clock of the file, if its times are rounded, or jitter.
+    ticks: Option<Ticks>,
     markings: LaneMarkings,
     dropped: SkippedRows,
     rows: u64,
@@ -181,6 +184,7 @@ impl<'a> Tracks<'a> {
             builder,
             window: Vec::new().into_iter(),
             period: ngsim::PERIOD,
+            ticks: None,
             markings: LaneMarkings::default(),
             dropped: SkippedRows::default(),
             rows: 0,
@@ -354,6 +358,7 @@ impl<'a> Tracks<'a> {
             self.window = Vec::new().into_iter();
             match self.next_row()? {
                 Some(mut row) => {
+                    self.snap(&mut row);
                     self.axes.turn(&mut row);
                     self.assign_lane(&mut row);
                     self.push(row)?;
@@ -395,6 +400,13 @@ impl<'a> Tracks<'a> {
         }
     }
 
+    /// Replaces a time that is rounded, or jitters.
+    fn snap(&self, row: &mut Row) {
+        if let Some(ticks) = &self.ticks {
+            ticks.snap(row);
+        }
+    }
+
     fn push(&mut self, row: Row) -> Result<(), ReadError> {
         self.builder.push(row).or_else(|error| self.drop_row(error))
     }
@@ -433,6 +445,10 @@ impl<'a> Tracks<'a> {
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         let frame_period = self.source.info().period.unwrap_or_else(|| period(beginning));
         let clock = FrameClock::of_rows(beginning, frame_period);
+        self.ticks = frame_times::ticks(beginning, clock)?;
+        let clock = self.ticks.map_or(clock, |ticks| ticks.clock(clock));
+        rows.iter_mut().for_each(|row| self.snap(row));
+        let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         self.period = clock.period;
         let start = start(beginning);
         let FileInfo { layout, markings: stated, .. } = self.source.info();
