@@ -139,7 +139,15 @@ pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<Trajector
     for warning in data.warnings() {
         warn(format_args!("{}: {warning}", path.display()));
     }
+    advise_on_lanes(data.doubts_lanes);
     Ok(data)
+}
+
+/// Names the option that takes no lane as recorded, if the recorded lanes are in doubt.
+pub(super) fn advise_on_lanes(are_in_doubt: bool) {
+    if are_in_doubt {
+        print_error(format_args!("help: `--lanes none` takes no lane as recorded\n"));
+    }
 }
 
 /// How a trajectory file is read.

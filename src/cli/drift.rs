@@ -10,7 +10,7 @@ use closecall_report::traffic::drift::DriftText;
 use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
-use super::output::{outln, print_text};
+use super::output::{outln, print_text, warn};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic drift`.
@@ -36,10 +36,17 @@ pub(super) struct DriftArgs {
 }
 
 pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
-    let drift = compare(&Fitted::read(&args.fitted)?, &args.data.read_all()?, args.seed);
+    let fitted = Fitted::read(&args.fitted)?;
+    let data_sets = args.data.read_all()?;
+    let are_lanes_in_doubt = data_sets.iter().any(|data| data.doubts_lanes);
+    let drift = compare(&fitted, &data_sets, args.seed);
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(drift), None, None)),
         Format::Human => print_text(DriftText(&drift)),
+    }
+    if are_lanes_in_doubt {
+        warn("the recorded lanes are in doubt, so that the comparison says nothing");
+        return Ok(ExitCode::Inconclusive);
     }
     Ok(match (drift.is_tested, drift.has_drifted) {
         (_, true) => ExitCode::Fail,

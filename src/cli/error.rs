@@ -268,7 +268,7 @@ fn remedy(problem: &TrajectoryFileProblem) -> String {
         TrajectoryFileProblem::LanesBesideMarkings { .. } => {
             format!("; {} `none` takes no lane as recorded, {mirror_d} turns the position", Argument("lanes"))
         }
-        TrajectoryFileProblem::LaneSpacing { .. } => {
+        TrajectoryFileProblem::LaneSpacing { .. } | TrajectoryFileProblem::LanesOutOfOrder { .. } => {
             format!("; {} `none` takes no lane as recorded", Argument("lanes"))
         }
         TrajectoryFileProblem::NoLanes { .. } => format!("; {} `none` estimates them", Argument("lanes")),

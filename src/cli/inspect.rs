@@ -8,7 +8,7 @@ use closecall_report::json::{self, stamped};
 use closecall_report::traffic::quality::QualityText;
 
 use super::CliError;
-use super::args::{Format, ReadArgs};
+use super::args::{Format, ReadArgs, advise_on_lanes};
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_text, reading};
 use crate::exit_code::ExitCode;
@@ -32,7 +32,8 @@ pub(super) struct InspectArgs {
 }
 
 /// Prints the flaws of a trajectory file. If some rows cannot be used, the exit code is the code of
-/// a file that other commands refuse.
+/// a file that other commands refuse. If the recorded lanes are in doubt, it is the code of other
+/// commands on them.
 pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     let mut inspector = QualityInspector::default();
     let tracks = reading(&args.file, || {
@@ -46,9 +47,10 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(json::quality(&tracks, &inspector), None, None)),
         Format::Human => print_text(QualityText { tracks: &tracks, inspector: &inspector }),
     }
+    advise_on_lanes(tracks.doubts_lanes());
     let dropped = tracks.dropped();
     if dropped.count() == 0 || args.read.drop_bad_rows {
-        return Ok(ExitCode::Pass);
+        return Ok(if tracks.doubts_lanes() { ExitCode::Inconclusive } else { ExitCode::Pass });
     }
     let path = tracks.path().display();
     let first = dropped.reasons().filter_map(|(_, rows)| Some((rows.first_line?, &rows.first))).min();

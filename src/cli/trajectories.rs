@@ -22,10 +22,10 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, LanesChoice, ReadArgs};
+use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes};
 use super::argument::Argument;
 use super::help::{examples, heading};
-use super::output::{command_line, outln, print_error, print_text, print_written, reading, warn, write_charts};
+use super::output::{command_line, outln, print_text, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
@@ -222,9 +222,7 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
     for warning in tracks.warnings().into_iter().chain(basis.warnings()) {
         warn(format_args!("{}: {warning}", args.file.display()));
     }
-    if basis.lacks_recorded_crossings() {
-        print_error(format_args!("help: `--lanes none` takes no lane as recorded\n"));
-    }
+    advise_on_lanes(basis.lacks_recorded_crossings() || tracks.doubts_lanes());
     let nothing = basis.unexplained_crossings(changes.len());
     if let Some(reason) = &nothing {
         warn(format_args!("{}: {reason}", args.file.display()));
@@ -260,6 +258,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     for warning in &file.warnings {
         warn(format_args!("{}: {warning}", args.file.display()));
     }
+    advise_on_lanes(file.doubts_lanes);
     let smoothed = &file.data;
     let speed_limit_mps = args.speed_limit_mps.map(|limit| limit.0);
     let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone };

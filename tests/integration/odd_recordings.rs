@@ -201,6 +201,74 @@ fn lateral_positions_in_feet_are_refused_by_that_reason() {
     assert_eq!(lane_changes(&mended, &[]).0.len(), lane_changes(&clean, &[]).0.len());
 }
 
+/// Returns the plain file of a window of US-101.
+fn window(name: &str) -> Option<PathBuf> {
+    Some(data()?.join("ngsim_us101/trajectories").join(name))
+}
+
+#[test]
+fn half_lateral_positions_are_refused_by_the_lane_width() {
+    let Some(clean) = window("us101_a.csv") else { return };
+    let folder = folder();
+    for (name, factor, width) in [("half.csv", 0.5, "1.8 m apart"), ("feet.csv", 1.0 / 0.3048, "`d_m` in feet")] {
+        let scaled = changed(&clean, &folder.path().join(name), |row| vec![("d_m", row("d_m") * factor)]);
+        let message = refusal(&scaled, &[]);
+        assert!(message.contains(width) && message.contains("--lanes `none`"), "{name}: {message}");
+    }
+    assert_eq!(lane_changes(&changed(&clean, &folder.path().join("same.csv"), |_| Vec::new()), &[]).0.len(), 21);
+}
+
+#[test]
+fn ngsim_with_positions_in_metres_and_sizes_in_feet_is_refused() {
+    let Some(data) = data() else { return };
+    let folder = folder();
+    let clean = data.join("ngsim_us101/us101_a_ngsim18col_feet.csv");
+    let in_metres = changed(&clean, &folder.path().join("metres.csv"), |row| {
+        ["Local_X", "Local_Y", "v_Vel", "v_Acc"].map(|name| (name, 0.3048 * row(name))).to_vec()
+    });
+    let message = refusal(&in_metres, &[]);
+    assert!(message.contains("`Local_X` in metres instead of feet"), "{message}");
+    assert_eq!(lane_changes(&clean, &[]).0.len(), 21);
+}
+
+#[test]
+fn lanes_whose_numbers_follow_no_order_are_refused_by_that_reason() {
+    let Some(clean) = window("us101_a.csv") else { return };
+    let folder = folder();
+    let orders =
+        [("permuted.csv", [3.0, 6.0, 7.0, 5.0, 1.0, 4.0, 2.0]), ("two.csv", [1.0, 3.0, 2.0, 4.0, 5.0, 6.0, 7.0])];
+    for (name, numbers) in orders {
+        let number = |lane: f64| numbers[lane as usize - 1];
+        let permuted = changed(&clean, &folder.path().join(name), |row| vec![("lane_id", number(row("lane_id")))]);
+        let message = refusal(&permuted, &[]);
+        let said = ["not in the order of the lanes", "--lanes `none`"];
+        assert!(said.iter().all(|said| message.contains(said)), "{name}: {message}");
+        assert!(!message.contains("from the right"), "{name}: {message}");
+    }
+}
+
+#[test]
+fn one_lane_number_for_all_vehicles_is_no_success_of_any_command() {
+    let Some(clean) = window("us101_a.csv") else { return };
+    let folder = folder();
+    let of_clean = folder.path().join("clean.toml");
+    stdout(&closecall(["traffic", "fit", clean.to_str().unwrap(), "-o", of_clean.to_str().unwrap()]), 0);
+    let one = changed(&clean, &folder.path().join("one.csv"), |_| vec![("lane_id", 1.0)]);
+    let (one, of_clean) = (one.to_str().unwrap(), of_clean.to_str().unwrap());
+    let drift = ["drift", of_clean, one];
+    let others = ["lane-changes", "criticality", "fit", "statistics", "inspect"].map(|command| [command, one]);
+    for words in others.iter().map(|words| &words[..]).chain([&drift[..]]) {
+        let output = closecall(["traffic"].iter().chain(words));
+        assert_eq!(code(&output), INCONCLUSIVE, "{words:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("`--lanes none`"), "{words:?}: {}", stderr(&output));
+    }
+    for [command, _] in others {
+        let output = closecall(["traffic", command, clean.to_str().unwrap()]);
+        assert!(!stderr(&output).contains("are spread over"), "{command}: {}", stderr(&output));
+        stdout(&output, 0);
+    }
+}
+
 /// Writes three vehicles at 30 m/s, of which the first one moves to the left by 3.75 m within
 /// `duration_s`, if that is given.
 fn three_vehicles(to: &Path, duration_s: Option<f64>) -> PathBuf {

@@ -22,8 +22,10 @@ pub struct SmoothedFile {
     pub flaws: FlawCounts,
     /// Time between two recorded frames.
     pub period: Time,
-    /// Whether a warning says that lane changes may be missing.
+    /// Whether a warning says that lane changes may be missing, or that the recorded lanes are none.
     pub is_in_doubt: bool,
+    /// Whether a warning says that the recorded lanes are none.
+    pub doubts_lanes: bool,
     /// What a reader of results has to know of the file.
     pub warnings: Vec<String>,
 }
@@ -43,7 +45,8 @@ pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, Tr
     }
     let data = read_with(path, options)?;
     let (flaws, warnings) = (count_flaws(&data), data.warnings());
-    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, is_in_doubt: data.is_in_doubt, warnings })
+    let (is_in_doubt, doubts_lanes) = (data.is_in_doubt, data.doubts_lanes);
+    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, is_in_doubt, doubts_lanes, warnings })
 }
 
 /// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
@@ -68,5 +71,5 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
     let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
     let (flaws, period, is_in_doubt) = (inspector.count_flaws(), file.period(), file.is_in_doubt());
-    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, warnings }))
+    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes: file.doubts_lanes(), warnings }))
 }

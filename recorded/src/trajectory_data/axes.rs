@@ -13,12 +13,17 @@ use closecall_traffic::statistics::quantiles::median;
 use super::error::TrajectoryFileProblem;
 use super::markings::{LaneMarkings, MarkedCarriageway};
 use super::source::{ReadError, Row};
+use crate::lane_change::LaneReliability;
 
 /// Least number of rows of a lane whose position is judged.
 const LEAST_ROWS: usize = 10;
 /// Least distance between the middles of two lanes (m). Below it, the positions say nothing about
 /// the order of the lanes.
 const LEAST_DISTANCE_M: f64 = 1.0;
+
+/// Number of pairs of neighbouring lanes against the order of their numbers, for each pair in order,
+/// above which the lanes lie in the opposite order: ramps may have numbers beside the count.
+const REVERSED: usize = 3;
 
 /// Distance outside of its lane beyond which a vehicle is misplaced (m): above the errors of lane
 /// numbers while a vehicle crosses a marking, below half a lane.
@@ -110,9 +115,13 @@ fn mirror_m(road: &MarkedCarriageway, options: AxisOptions, rows: &[Row], markin
     if (usual_m - at_the_edge_m).abs() < LEAST_DISTANCE_M { at_the_edge_m } else { usual_m }
 }
 
-/// Rejects rows in which more neighbouring lanes lie in the opposite order of their numbers than in
-/// their order.
-pub(super) fn check_order(rows: &[Row], markings: Option<&LaneMarkings>) -> Result<(), ReadError> {
+/// Rejects rows in which nearly all neighbouring lanes lie in the opposite order of their numbers, or,
+/// if the recorded lanes count, more of them than in their order.
+pub(super) fn check_order(
+    rows: &[Row],
+    markings: Option<&LaneMarkings>,
+    reliability: LaneReliability,
+) -> Result<(), ReadError> {
     let mut lanes: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.lane > 0) {
         lanes.entry(row.lane).or_default().push(row.d_m);
@@ -143,6 +152,14 @@ pub(super) fn check_order(rows: &[Row], markings: Option<&LaneMarkings>) -> Resu
     let is_mirrored = first.1 + last.1 > 2.0 * own.map_or(0.0, |road| road.left_m);
     let lanes = [first.0, last.0];
     let apart_m = last.1 - first.1;
+    if contradict <= REVERSED * agree {
+        return match reliability {
+            LaneReliability::Reliable => {
+                Err(ReadError::of_file(TrajectoryFileProblem::LanesOutOfOrder { lanes, apart_m }))
+            }
+            LaneReliability::Unreliable | LaneReliability::Estimated => Ok(()),
+        };
+    }
     Err(ReadError::of_file(TrajectoryFileProblem::LanesAgainstPosition { lanes, apart_m, is_mirrored }))
 }
 

@@ -30,8 +30,8 @@ const MAX_ROWS: usize = 20_000_000;
 /// Shortest step between two frames: shorter ones are the rounding of a file.
 const SHORTEST_STEP: Time = Time::from_ms(1);
 
-/// One in this number of steps is the least share of the most frequent one. If times jitter, no step is
-/// frequent, and the median step counts.
+/// One in this number of steps is the least share of the most frequent one. If times jitter, no step
+/// is frequent, and the median step counts.
 const RARE: usize = 10;
 /// Share of a step by which steps may differ before their mean is taken (-), as in `assemble`.
 const UNEVENNESS: f64 = 0.02;
@@ -252,8 +252,8 @@ fn steps(span: Time, period: Time) -> i64 {
     (span.ns() + period.ns() / 2).div_euclid(period.ns())
 }
 
-/// Returns the time between two frames: the most frequent one between two successive rows of a vehicle,
-/// or the mean of such times, if they are rounded or jitter.
+/// Returns the time between two frames: the most frequent one between two successive rows of a
+/// vehicle, or the mean of such times, if they are rounded or jitter.
 fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut steps_us: Vec<i64> = Vec::new();

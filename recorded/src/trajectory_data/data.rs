@@ -58,8 +58,10 @@ pub struct TrajectoryData {
     /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from
     /// a file.
     pub hash: String,
-    /// Whether a warning says that lane changes may be missing.
+    /// Whether a warning says that lane changes may be missing, or that the recorded lanes are none.
     pub is_in_doubt: bool,
+    /// Whether a warning says that the recorded lanes are none.
+    pub doubts_lanes: bool,
     /// Unknown names of vehicle classes in the file.
     pub unknown_classes: Vec<UnknownClass>,
     /// What the reader of the file notes on its content.
@@ -98,6 +100,7 @@ impl TrajectoryData {
             trajectories,
             hash: String::new(),
             is_in_doubt: false,
+            doubts_lanes: false,
             unknown_classes: Vec::new(),
             notes: Vec::new(),
             continuity: Continuity::default(),

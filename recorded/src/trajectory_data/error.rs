@@ -368,18 +368,32 @@ pub enum TrajectoryFileProblem {
         /// Whether the positions have the sign of the other side, too.
         is_mirrored: bool,
     },
+    /// Some lanes lie in another order than their numbers.
+    #[error(
+        "lane {} lies {apart_m:.1} m to the left of lane {}, but lanes are numbered from the left, as other lanes of the file are: the \
+         numbers are not in the order of the lanes",
+        lanes[1], lanes[0]
+    )]
+    LanesOutOfOrder {
+        /// Two lanes with successive numbers.
+        lanes: [u8; 2],
+        /// Distance by which the second one lies to the left of the first one (m).
+        apart_m: f64,
+    },
     /// The middles of neighbouring lanes are further apart than lanes are wide, or closer.
     #[error(
-        "the middles of lanes {} and {} are {per_lane_m:.1} m apart for each lane, by `d_m` and `lane_id`, and {}",
-        lanes[0], lanes[1], suspected_unit(*is_too_wide)
+        "lanes {} and {} are {per_lane_m:.1} m apart by the recorded lanes and lateral positions, but lanes are {} to {} m wide: \
+         {cause}",
+        lanes[0], lanes[1], LANE_WIDTHS_M.start(), LANE_WIDTHS_M.end()
     )]
     LaneSpacing {
         /// The first two such lanes.
         lanes: [u8; 2],
-        /// Distance of their middles, divided by the difference of their numbers (m).
+        /// Distance of their middles, divided by the difference of their numbers (m), or the median of all
+        /// such distances.
         per_lane_m: f64,
-        /// Whether the lanes are too far apart, and not too close.
-        is_too_wide: bool,
+        /// The question for the likely cause.
+        cause: &'static str,
     },
     /// Vehicles are not between the markings of their lanes.
     #[error(
@@ -554,15 +568,6 @@ impl TrajectoryFileProblem {
             _ => "other",
         }
     }
-}
-
-/// Returns the likely cause of lanes that are too far apart, or too close.
-fn suspected_unit(is_too_wide: bool) -> String {
-    let cause = match is_too_wide {
-        true => "is `d_m` in feet, of which each has 0.3048 m?",
-        false => "is `d_m` the distance from the middle of each lane, or converted to metres twice?",
-    };
-    format!("lanes are {} to {} m wide: {cause}", LANE_WIDTHS_M.start(), LANE_WIDTHS_M.end())
 }
 
 /// An error while writing a trajectory file. A file that existed before at the same path is left

@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 use closecall_traffic::statistics::quantiles::median;
 
 use super::error::TrajectoryFileProblem;
+use super::file_layout::Layout;
 use super::markings::CARRIAGEWAY_GAP_M;
 use super::source::{ReadError, Row};
 
@@ -71,10 +72,24 @@ pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
         let odd: Vec<&Spacing> = spacings.iter().filter(|spacing| spacing.is_odd(is_too_wide)).collect();
         if let Some(first) = odd.first().filter(|_| 2 * odd.len() > spacings.len()) {
             let Spacing { lanes, per_lane_m } = **first;
-            return Err(ReadError::of_file(TrajectoryFileProblem::LaneSpacing { lanes, per_lane_m, is_too_wide }));
+            let cause = suspected_cause(Layout::Plain, is_too_wide);
+            return Err(ReadError::of_file(TrajectoryFileProblem::LaneSpacing { lanes, per_lane_m, cause }));
         }
     }
     Ok(())
+}
+
+/// Returns the question for the likely cause of lanes that are too far apart, or too close.
+pub(super) fn suspected_cause(layout: Layout, is_too_wide: bool) -> &'static str {
+    match (layout, is_too_wide) {
+        (Layout::Plain, true) => "is `d_m` in feet, of which each has 0.3048 m?",
+        (Layout::Plain, false) => {
+            "is `d_m` the distance from the middle of each lane, converted to metres twice, or in another unit?"
+        }
+        (Layout::Ngsim18 | Layout::Ngsim25, true) => "is `Local_X` in another unit than feet?",
+        (Layout::Ngsim18 | Layout::Ngsim25, false) => "is `Local_X` in metres instead of feet?",
+        _ => "are the lateral positions in another unit?",
+    }
 }
 
 #[cfg(test)]

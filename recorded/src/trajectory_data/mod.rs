@@ -97,6 +97,7 @@ mod plausible;
 mod quality;
 mod reference_line;
 mod rows;
+mod side_by_side;
 mod skipped_rows;
 mod source;
 mod sumo;

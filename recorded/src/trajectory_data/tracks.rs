@@ -20,6 +20,7 @@ use super::markings::LaneMarkings;
 use super::ngsim;
 use super::order::{WINDOW_ROWS, order_of};
 use super::plausible;
+use super::side_by_side::SideBySide;
 use super::skipped_rows::SkippedRows;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use crate::lane_change::LaneReliability;
@@ -141,6 +142,8 @@ pub struct Tracks<'a> {
     axes: Axes,
     /// What a reader of results has to know of the axes.
     axis_warning: Option<String>,
+    /// Why the recorded lanes are in doubt.
+    lane_doubt: Option<String>,
     /// `true` if the file is of a simulation, in which a lane change may take a single step.
     is_simulated: bool,
     lanes: LaneReliability,
@@ -178,6 +181,7 @@ impl<'a> Tracks<'a> {
             axis_options: options.axes,
             axes: Axes::default(),
             axis_warning: None,
+            lane_doubt: None,
             is_simulated: false,
             lanes: options.lanes,
             estimated: None,
@@ -253,9 +257,16 @@ impl<'a> Tracks<'a> {
         }
     }
 
-    /// Returns `true` if a warning on the rows so far says that lane changes may be missing.
+    /// Returns `true` if a warning on the rows so far says that lane changes may be missing, or that
+    /// the recorded lanes are none.
     pub fn is_in_doubt(&self) -> bool {
-        self.is_coarse() || self.continuity().hides_lane_changes()
+        self.is_coarse() || self.doubts_lanes() || self.continuity().hides_lane_changes()
+    }
+
+    /// Returns `true` if a warning says that the recorded lanes are none: vehicles of one lane drive
+    /// beside each other.
+    pub fn doubts_lanes(&self) -> bool {
+        self.lane_doubt.is_some()
     }
 
     /// Returns the rows skipped so far.
@@ -290,7 +301,7 @@ impl<'a> Tracks<'a> {
             )
         });
         let coarse = self.is_coarse().then(|| coarse_frames(self.period));
-        let notes = self.source.warnings().into_iter().chain(self.axis_warning.clone());
+        let notes = self.source.warnings().into_iter().chain(self.axis_warning.clone()).chain(self.lane_doubt.clone());
         notes.chain(coarse).chain(unknown_lanes).collect()
     }
 
@@ -326,6 +337,7 @@ impl<'a> Tracks<'a> {
         }
         let (hash, continuity) = (self.hash(), self.continuity());
         let (notes, lanes, is_in_doubt) = (self.notes(), self.lanes(), self.is_in_doubt());
+        let doubts_lanes = self.doubts_lanes();
         if let Some(estimated) = self.estimated_markings() {
             data.markings = estimated;
         }
@@ -336,6 +348,7 @@ impl<'a> Tracks<'a> {
             notes,
             lanes,
             is_in_doubt,
+            doubts_lanes,
             unknown_classes: self.unknown_classes().to_vec(),
             ..data
         })
@@ -460,9 +473,14 @@ impl<'a> Tracks<'a> {
         let states_lanes =
             matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);
         if states_lanes || self.axis_options != AxisOptions::default() {
-            axes::check_order(beginning, stated.as_ref())?;
+            axes::check_order(beginning, stated.as_ref(), self.lanes)?;
         }
         self.source.check_sides(self.axis_options.mirror_d)?;
+        if states_lanes && self.lanes == LaneReliability::Reliable {
+            let side_by_side = SideBySide::of(beginning);
+            side_by_side.check(layout)?;
+            self.lane_doubt = side_by_side.doubt();
+        }
         // The other layouts state their units, or derive the lanes from the positions.
         if layout == Layout::Plain && self.lanes == LaneReliability::Reliable {
             lane_spacing::check(beginning)?;
