@@ -268,6 +268,11 @@ fn remedy(problem: &TrajectoryFileProblem) -> String {
         TrajectoryFileProblem::LanesBesideMarkings { .. } => {
             format!("; {} `none` takes no lane as recorded, {mirror_d} turns the position", Argument("lanes"))
         }
+        TrajectoryFileProblem::IndexAgainstPosition { .. } => format!(
+            "; {mirror_d} and {from_right} together turn a mirrored file, {} `none` reads traffic on the left and takes no lane as \
+             recorded",
+            Argument("lanes")
+        ),
         TrajectoryFileProblem::LaneSpacing { .. } | TrajectoryFileProblem::LanesOutOfOrder { .. } => {
             format!("; {} `none` takes no lane as recorded", Argument("lanes"))
         }

@@ -19,6 +19,7 @@ use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
 use super::inferred_road::{InferredRoad, Placed, Pose};
+use super::lane_sides::LaneSides;
 use super::markings::LaneMarkings;
 use super::plain::allowed;
 use super::reference_line::Point;
@@ -220,7 +221,8 @@ impl Collected {
         });
         let markings = facts.markings.or_else(|| road.as_ref().map(InferredRoad::markings));
         let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
-        Ok(CollectedSource { items: items.collect(), info, notes, unknown_classes: facts.unknown_classes })
+        let (items, unknown_classes) = (items.collect(), facts.unknown_classes);
+        Ok(CollectedSource { items, info, notes, unknown_classes, lane_sides: LaneSides::default() })
     }
 }
 
@@ -360,6 +362,14 @@ pub(super) struct CollectedSource {
     info: FileInfo,
     notes: Vec<String>,
     unknown_classes: UnknownClasses,
+    lane_sides: LaneSides,
+}
+
+impl CollectedSource {
+    /// Adds what vehicles beside each other show of the lanes.
+    pub(super) fn with_lane_sides(self, lane_sides: LaneSides) -> Self {
+        Self { lane_sides, ..self }
+    }
 }
 
 impl RowSource for CollectedSource {
@@ -373,6 +383,10 @@ impl RowSource for CollectedSource {
 
     fn warnings(&self) -> Vec<String> {
         self.notes.clone()
+    }
+
+    fn check_lane_sides(&self, is_mirrored: bool) -> Result<(), ReadError> {
+        self.lane_sides.check(is_mirrored).map_err(ReadError::of_file)
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

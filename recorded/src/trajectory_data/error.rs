@@ -368,6 +368,17 @@ pub enum TrajectoryFileProblem {
         /// Whether the positions have the sign of the other side, too.
         is_mirrored: bool,
     },
+    /// Lanes that a layout counts from the right lie in the opposite order.
+    #[error(
+        "in {percent:.0} % of {comparisons} comparisons of vehicles beside each other, the one in the lane with the larger index is on \
+         the right, but lanes are counted from the right: the file is mirrored, or its traffic drives on the left"
+    )]
+    IndexAgainstPosition {
+        /// Share of these comparisons (%).
+        percent: f64,
+        /// Number of comparisons.
+        comparisons: usize,
+    },
     /// Some lanes lie in another order than their numbers.
     #[error(
         "lane {} lies {apart_m:.1} m to the left of lane {}, but lanes are numbered from the left, as other lanes of the file are: the \

@@ -79,6 +79,7 @@ mod in_car;
 mod inferred_road;
 mod input;
 mod json_input;
+mod lane_sides;
 mod lane_spacing;
 mod lanelets;
 mod layout;

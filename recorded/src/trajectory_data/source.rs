@@ -90,6 +90,15 @@ pub(super) trait RowSource {
         Ok(())
     }
 
+    /// Checks that lanes which the file counts from the right agree with the positions, which are
+    /// mirrored if `is_mirrored`.
+    ///
+    /// # Errors
+    /// They contradict them.
+    fn check_lane_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
+        Ok(())
+    }
+
     /// States that the position along the road falls in the direction of travel, so that speeds may be
     /// negative. It is called before the first row.
     fn expect_reversed(&mut self) {}

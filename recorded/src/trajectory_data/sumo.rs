@@ -29,7 +29,7 @@ use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, number, optional_number, wrong_value};
 use super::file_layout::Layout;
 use super::header::Header;
-use super::markings::LANE_WIDTHS_M;
+use super::lane_sides::{Beside, LaneSides};
 use super::plain::allowed;
 use super::rows::{Lines, Separator, each_row};
 use super::source::{Clock, ReadError};
@@ -39,14 +39,6 @@ use super::xml::{Node, Xml};
 const ATTRIBUTES: &[&str] = &["time", "id", "x", "y", "angle", "type", "speed", "lane", "acceleration"];
 
 const ANGLE_DEG: Bounds = Bounds::closed(-360.0, 720.0);
-
-/// Longest distance along the road at which two vehicles show the width of their lanes (m): a bend
-/// of a motorway departs by less than a decimetre from its tangent.
-const BESIDE_M: f64 = 30.0;
-/// Number of pairs of vehicles after which the lane width is known.
-const ENOUGH_PAIRS: usize = 20_000;
-/// Number of later vehicles of the same instant with which a vehicle is compared.
-const COMPARED: usize = 8;
 
 /// Names of classes and their sizes (m): SUMO's vehicle classes, and its types without a name.
 const SIZES: [(&str, VehicleClass, f64, f64); 12] = [
@@ -71,14 +63,6 @@ struct Entry<'a> {
     field: &'a dyn Fn(&'static str) -> &'a str,
 }
 
-/// A vehicle beside others: edge, index of the lane, and pose.
-struct Beside {
-    edge: String,
-    index: i64,
-    point: (f64, f64),
-    heading_rad: f64,
-}
-
 /// What is gathered while the file is read.
 #[derive(Default)]
 struct Reader {
@@ -88,10 +72,7 @@ struct Reader {
     named_lanes: HashMap<String, u64>,
     /// Edge and lane index of the latest row of each vehicle.
     latest: BTreeMap<u32, (String, i64)>,
-    /// The vehicles of the current time step.
-    beside: Vec<Beside>,
-    current: Option<Time>,
-    widths_m: Vec<f64>,
+    lane_sides: LaneSides,
 }
 
 /// Reads the XML form.
@@ -193,7 +174,8 @@ impl Reader {
         let vehicle = self.collected.vehicle(field("id"));
         let lane = field("lane").rsplit_once('_').and_then(|(edge, index)| Some((edge, index.parse().ok()?)));
         let changes_lane = lane.is_some_and(|(edge, index): (&str, i64)| {
-            self.show_width(time, Beside { edge: edge.to_owned(), index, point: (front_x_m, front_y_m), heading_rad });
+            let (road, point) = (edge.to_owned(), (front_x_m, front_y_m));
+            self.lane_sides.add(time, Beside { vehicle, road, index, point, heading_rad });
             let before = self.latest.insert(vehicle, (edge.to_owned(), index));
             before.is_some_and(|(before_edge, before_index)| before_edge == edge && before_index != index)
         });
@@ -240,42 +222,21 @@ impl Reader {
         }
     }
 
-    /// Compares a vehicle with those in the neighbouring lanes at the same time.
-    fn show_width(&mut self, time: Time, vehicle: Beside) {
-        if self.widths_m.len() >= ENOUGH_PAIRS {
-            return;
-        }
-        if self.current.replace(time) != Some(time) {
-            self.beside.clear();
-        }
-        for other in self.beside.iter().rev().take(COMPARED) {
-            let (dx, dy) = (vehicle.point.0 - other.point.0, vehicle.point.1 - other.point.1);
-            let (cos, sin) = (maths::cos(vehicle.heading_rad), maths::sin(vehicle.heading_rad));
-            let (along_m, left_m) = (dx * cos + dy * sin, dy * cos - dx * sin);
-            let is_neighbour = other.edge == vehicle.edge && vehicle.index - other.index == left_m.signum() as i64;
-            if is_neighbour && along_m.abs() < BESIDE_M && LANE_WIDTHS_M.contains(&left_m.abs()) {
-                self.widths_m.push(left_m.abs());
-            }
-        }
-        self.beside.push(vehicle);
-    }
-
-    fn finish(mut self) -> Result<CollectedSource, ReadError> {
-        let middle = self.widths_m.len() / 2;
-        let lane_width_m =
-            (!self.widths_m.is_empty()).then(|| *self.widths_m.select_nth_unstable_by(middle, f64::total_cmp).1);
+    fn finish(self) -> Result<CollectedSource, ReadError> {
+        let lane_width_m = self.lane_sides.lane_width_m();
         let sizes = "the file states no sizes of vehicles: they have the default size of the class that their type names in SUMO";
         let mut notes = vec![sizes.to_owned()];
         if lane_width_m.is_none() {
             notes.push("no vehicles drive beside each other: the lane width is assumed".to_owned());
         }
-        self.collected.into_source(Facts {
+        let source = self.collected.into_source(Facts {
             layout: Layout::Sumo,
             clock: Clock::Simulated,
             lane_width_m,
             markings: None,
             notes,
             unknown_classes: self.unknown_classes,
-        })
+        })?;
+        Ok(source.with_lane_sides(self.lane_sides))
     }
 }

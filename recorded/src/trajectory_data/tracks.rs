@@ -476,6 +476,9 @@ impl<'a> Tracks<'a> {
             axes::check_order(beginning, stated.as_ref(), self.lanes)?;
         }
         self.source.check_sides(self.axis_options.mirror_d)?;
+        if self.lanes == LaneReliability::Reliable {
+            self.source.check_lane_sides(self.axis_options.mirror_d)?;
+        }
         if states_lanes && self.lanes == LaneReliability::Reliable {
             let side_by_side = SideBySide::of(beginning);
             side_by_side.check(layout)?;

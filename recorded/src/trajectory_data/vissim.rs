@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The user chooses the columns. Units follow the comments above the header; without them, metres
-//! and km/h. Two sets of columns give a position:
+//! and km/h. Coordinates have a unit of their own. Two sets of columns give a position:
 //!
 //! - `COORDFRONT` and `COORDREAR` (or these with `X` and `Y`): the middle of the front and of the
 //!   rear in a plane. The road is inferred from the traffic; see `inferred_road`. If `LANE\LINK\NO`
@@ -31,6 +31,7 @@ use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
 use super::file_layout::Layout;
 use super::header::Header;
+use super::lane_sides::{Beside, LaneSides};
 use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 use super::plain::allowed;
 use super::rows::{Fields, Lines, Separator, each_row};
@@ -69,6 +70,8 @@ const MPH_MPS: f64 = 0.447_04;
 #[derive(Clone, Copy, Debug)]
 struct Units {
     length: f64,
+    /// Of coordinates in the plane.
+    plane: f64,
     speed: f64,
     acceleration: f64,
     are_stated: bool,
@@ -76,7 +79,7 @@ struct Units {
 
 impl Default for Units {
     fn default() -> Self {
-        Self { length: 1.0, speed: KMH_MPS, acceleration: 1.0, are_stated: false }
+        Self { length: 1.0, plane: 1.0, speed: KMH_MPS, acceleration: 1.0, are_stated: false }
     }
 }
 
@@ -88,6 +91,9 @@ impl Units {
         let unit = unit.trim_end().trim_end_matches(']').trim();
         let (target, allowed): (&mut f64, &[(&str, f64)]) = match name.trim() {
             "POS" | "LENGTH" | "WIDTH" => (&mut self.length, &[("m", 1.0), ("ft", FOOT_M)]),
+            name if name.starts_with("COORDFRONT") || name.starts_with("COORDREAR") => {
+                (&mut self.plane, &[("m", 1.0), ("ft", FOOT_M)])
+            }
             "SPEED" => (
                 &mut self.speed,
                 &[("km/h", KMH_MPS), ("mph", MPH_MPS), ("mi/h", MPH_MPS), ("m/s", 1.0), ("ft/s", FOOT_M)],
@@ -179,6 +185,7 @@ struct Reader {
     lanes: BTreeMap<u32, u8>,
     /// Link, lane and position across the lane in the latest row of each vehicle.
     latest: BTreeMap<u32, (u32, u8, f64)>,
+    lane_sides: LaneSides,
     /// `true` if rows with positions in a plane name lanes.
     names_lanes: bool,
     /// Steps across the road at all lane changes (lanes), if the position across the lane grows to the
@@ -219,6 +226,7 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
         unknown_classes: UnknownClasses::default(),
         lanes: BTreeMap::new(),
         latest: BTreeMap::new(),
+        lane_sides: LaneSides::default(),
         names_lanes: false,
         steps: [0.0; 2],
     };
@@ -245,7 +253,8 @@ impl Reader {
         integer(text(vehicle), "NO", allowed::IDS)?;
         let class = self.class(vehicle_type.map_or("", text));
         let typical = class.typical_dimensions();
-        let Units { length: length_unit, speed: speed_unit, acceleration: acceleration_unit, .. } = self.units;
+        let Units { length: length_unit, plane: plane_unit, speed: speed_unit, acceleration: acceleration_unit, .. } =
+            self.units;
         let stated_length = length.map(|index| real(index, "LENGTH", length_unit, allowed::LENGTH_M)).transpose()?;
         let width_m = width.map(|index| real(index, "WIDTH", length_unit, allowed::WIDTH_M)).transpose()?;
         let (position, length_m) = match place {
@@ -264,23 +273,26 @@ impl Reader {
                 (Position::Road { road: link, s_m: front_m - 0.5 * length_m, d_m, lane: index }, length_m)
             }
             Place::Points(columns) => {
-                let [front, rear] = columns.map(|index| point(text(index)));
+                let [front, rear] = columns.map(|index| point(text(index), plane_unit));
                 in_plane(front?, rear?)?
             }
             Place::Coordinates([front_x, front_y, rear_x, rear_y]) => {
-                let plane = |index: usize, name| number(text(index), name, allowed::PLANE_M);
+                let plane = |index: usize, name: &'static str| {
+                    number(text(index), name, allowed::PLANE_M).map(|value| plane_unit * value)
+                };
                 let front = (plane(front_x, "COORDFRONTX")?, plane(front_y, "COORDFRONTY")?);
                 in_plane(front, (plane(rear_x, "COORDREARX")?, plane(rear_y, "COORDREARY")?))?
             }
         };
         let lane = lane.map(|(link, index)| (text(link), text(index)));
-        let position = self.in_named_lane(position, lane, text(vehicle));
+        let time = Time::from_s(number(text(time), "SIMSEC", allowed::TIME_S)?);
+        let position = self.in_named_lane(position, lane, text(vehicle), time);
         let acceleration_mps2 = acceleration
             .map(|index| real(index, "ACCELERATION", acceleration_unit, allowed::ACCELERATION_MPS2))
             .transpose()?;
         Ok(CollectedRow {
             vehicle: self.collected.vehicle(text(vehicle)),
-            time: Time::from_s(number(text(time), "SIMSEC", allowed::TIME_S)?),
+            time,
             position,
             speed_mps: real(speed, "SPEED", speed_unit, allowed::SPEED_MPS)?,
             acceleration_mps2,
@@ -292,7 +304,13 @@ impl Reader {
     }
 
     /// Adds the lane that a row names to a position in a plane. Texts that name no lane are left out.
-    fn in_named_lane(&mut self, position: Position, lane: Option<(&str, &str)>, vehicle: &str) -> Position {
+    fn in_named_lane(
+        &mut self,
+        position: Position,
+        lane: Option<(&str, &str)>,
+        vehicle: &str,
+        time: Time,
+    ) -> Position {
         let lane = lane.and_then(|(link, index)| Some((link.parse::<u32>().ok()?, index.parse::<u8>().ok()?)));
         let (Position::Plane { point, heading_rad, .. }, Some((link, index))) = (position, lane) else {
             return position;
@@ -300,6 +318,8 @@ impl Reader {
         self.names_lanes = true;
         let vehicle = self.collected.vehicle(vehicle);
         let before = self.latest.insert(vehicle, (link, index, 0.0));
+        let beside = Beside { vehicle, road: link.to_string(), index: i64::from(index), point, heading_rad };
+        self.lane_sides.add(time, beside);
         let changes_lane = before.is_some_and(|(last_link, last_index, _)| last_link == link && last_index != index);
         let named_lane = Some((u64::from(link) << u8::BITS) | u64::from(index));
         Position::Plane { point, heading_rad, changes_lane, named_lane }
@@ -359,14 +379,15 @@ impl Reader {
                 *lane = first_lane + lanes - *lane + 1;
             }
         }
-        self.collected.into_source(Facts {
+        let source = self.collected.into_source(Facts {
             layout: Layout::Vissim,
             clock: Clock::Simulated,
             lane_width_m: None,
             markings,
             notes,
             unknown_classes: self.unknown_classes,
-        })
+        })?;
+        Ok(source.with_lane_sides(self.lane_sides))
     }
 
     /// Returns the road of each link, and the markings of all of them.
@@ -408,11 +429,11 @@ fn named(error: FieldError, text: &str) -> FieldError {
     }
 }
 
-/// Parses a point `x y z`.
-fn point(text: &str) -> Result<(f64, f64), FieldError> {
+/// Parses a point `x y z` in `unit` metres.
+fn point(text: &str, unit: f64) -> Result<(f64, f64), FieldError> {
     let mut parts = text.split_ascii_whitespace().map(|part| number(part, "COORDFRONT", allowed::PLANE_M));
     match (parts.next(), parts.next()) {
-        (Some(x_m), Some(y_m)) => Ok((x_m?, y_m?)),
+        (Some(x), Some(y)) => Ok((unit * x?, unit * y?)),
         _ => Err(FieldError::at("COORDFRONT", wrong_value(text, "a point such as `10.5 3.2 0.0`".to_owned()))),
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::detect;
 use closecall_recorded::trajectory_data::{
-    BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, TrajectoryFileProblem, open_from,
+    AxisOptions, BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, TrajectoryFileProblem, open_from,
     read, read_from, read_with,
 };
 use closecall_traffic::{Side, Time, VehicleClass, maths};
@@ -387,6 +387,47 @@ fn lanes_of_vissim_beside_coordinates_are_the_recorded_lanes() {
     let change = points.windows(2).position(|pair| pair[0].lane != pair[1].lane);
     assert!(change.is_some_and(|frame| (64..=65).contains(&frame)), "{change:?}");
     assert!(!data.notes.iter().any(|note| note.contains("states no lanes")), "{:?}", data.notes);
+}
+
+/// Mirrored positions of a made-up road with the indices of its lanes.
+#[test]
+fn mirrored_files_of_sumo_and_vissim_are_refused_and_the_named_options_mend_them() {
+    let sumo = sumo_xml(false).replace("y=\"-", "y=\"");
+    let columns = r"LANE\LINK\NO;LANE\INDEX;SPEED;COORDFRONTX;COORDFRONTY;COORDREARX;COORDREARY";
+    let vissim = vissim(columns, |drive, time_s| {
+        let (front_m, y_m, index) = drive.at(time_s, false);
+        let (rear_m, speed_kmh) = (front_m - 5.0, 3.6 * drive.speed_mps);
+        format!("1;{};{speed_kmh:.3};{front_m:.3};{:.3};{rear_m:.3};{:.3}", index + 1, -y_m, -y_m)
+    });
+    let axes = AxisOptions { mirror_d: true, lanes_from_right: true, ..AxisOptions::default() };
+    let options = ReadOptions { axes, ..ReadOptions::default() };
+    for text in [sumo, vissim] {
+        let problem = read_text(text.as_bytes()).unwrap_err().problem;
+        assert!(matches!(problem, TrajectoryFileProblem::IndexAgainstPosition { .. }), "{problem}");
+        let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
+        let changes = detect(&smooth(&tracks.and_then(|tracks| tracks.collect_all()).unwrap()));
+        let [change] = &changes[..] else { panic!("{}", changes.len()) };
+        assert_eq!((change.track_id, change.direction), (2, Side::Left));
+    }
+    // The options do not pass on a file that is as it should be.
+    assert!(open_from(sumo_xml(false).as_bytes(), Path::new("a"), options, usize::MAX).is_err());
+}
+
+#[test]
+fn coordinates_of_vissim_in_feet_are_read_as_their_comments_state() {
+    const FOOT_M: f64 = 0.3048;
+    let in_feet = vissim("SPEED;COORDFRONT;COORDREAR", |drive, time_s| {
+        let (front_m, y_m, _) = drive.at(time_s, false);
+        let [front, rear, y] = [front_m, front_m - 5.0, y_m / SUMO_LANE_M * VISSIM_LANE_M].map(|value_m| value_m / FOOT_M);
+        format!("{:.3};{front:.3} {y:.3} 0.0;{rear:.3} {y:.3} 0.0", 3.6 * drive.speed_mps)
+    });
+    let units = "* POS: Position [m]\n* COORDFRONT: Front [ft]\n* COORDREAR: Rear [ft]\n";
+    let data = read_text(in_feet.replace("* POS: Position [m]\n", units).as_bytes()).unwrap();
+    assert!((data.trajectories[0].dimensions.length_m - 5.0).abs() < 0.01);
+    let changes = detect(&smooth(&data));
+    let [change] = &changes[..] else { panic!("{}", changes.len()) };
+    assert_eq!((change.track_id, change.direction), (2, Side::Left));
+    assert!(read_text(in_feet.as_bytes()).is_err(), "as metres, the speeds contradict the positions");
 }
 
 #[test]
