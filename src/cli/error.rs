@@ -292,6 +292,8 @@ fn remedy(problem: &TrajectoryFileProblem) -> String {
         TrajectoryFileProblem::SeveralRecordings { .. } | TrajectoryFileProblem::NoSuchLocation { .. } => {
             format!("; {} names the data set of NGSIM's export to read", Argument("location"))
         }
+        // All rows have this problem: they would all be left out.
+        TrajectoryFileProblem::HeadingUnit { .. } | TrajectoryFileProblem::NoMarkings { .. } => String::new(),
         problem if problem.affects_one_row() => {
             format!("; {} skips such rows, and counts them", Argument("drop-bad-rows"))
         }

@@ -10,7 +10,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
-use closecall_traffic::{Time, VehicleClass};
+use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::builder::PIECE_STRIDE;
 use super::class_names::{UnknownClass, UnknownClasses};
@@ -47,6 +47,12 @@ const LANE_CHANGE_M: f64 = 1.75;
 /// Largest number of vehicles that are tried as references: of ten drivers on a section, one or two
 /// change lanes.
 const MAX_REFERENCES: usize = 20;
+
+/// Least movement that shows a direction (m), least number of such steps, and the cosine of the
+/// largest angle between a heading and the movement, 30° (-).
+const LEAST_STEP_M: f64 = 0.3;
+const LEAST_STEPS: usize = 50;
+const MOST_TURNED: f64 = 0.866;
 
 /// Number of lane changes by jumps that may have another cause.
 const FEW_JUMPS: u64 = 0;
@@ -149,7 +155,12 @@ impl Collected {
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by_key(|&index| (rows[index].vehicle, rows[index].time, rows[index].line));
         let period = period(&rows, &order);
-        let road = infer_road(&rows, &order, facts.lane_width_m)?;
+        let road = infer_road(&rows, &order, facts.lane_width_m).map_err(|error| match error.problem {
+            TrajectoryFileProblem::NoRoad { .. } => {
+                against_headings(&rows, &order).map_or(error, ReadError::of_file)
+            }
+            _ => error,
+        })?;
         notes.extend(road.as_ref().and_then(InferredRoad::warning));
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
@@ -281,6 +292,26 @@ fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
         return Time::from_ns(1_000 * usual_us);
     }
     Time::from_ns(1_000 * steps_us.iter().sum::<i64>() / steps_us.len().max(1) as i64)
+}
+
+/// Returns the problem of headings that contradict the movements of the vehicles, if most of them do.
+fn against_headings(rows: &[CollectedRow], order: &[usize]) -> Option<TrajectoryFileProblem> {
+    let (mut against, mut all) = (0_usize, 0_usize);
+    for pair in order.windows(2) {
+        let (before, after) = (&rows[pair[0]], &rows[pair[1]]);
+        let (Position::Plane { point: from, .. }, Position::Plane { point: to, heading_rad, .. }) =
+            (before.position, after.position)
+        else {
+            continue;
+        };
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        if before.vehicle == after.vehicle && maths::hypot(dx, dy) >= LEAST_STEP_M {
+            all += 1;
+            against += usize::from(maths::cos(maths::atan2(dy, dx) - heading_rad) < MOST_TURNED);
+        }
+    }
+    let percent = 100.0 * against as f64 / all.max(1) as f64;
+    (all >= LEAST_STEPS && 2 * against > all).then_some(TrajectoryFileProblem::HeadingsAgainstMotion { percent })
 }
 
 /// Infers the road, if positions lie in a plane.

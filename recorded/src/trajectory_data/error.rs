@@ -169,6 +169,34 @@ pub enum TrajectoryFileProblem {
         /// The speed (m/s).
         speed_mps: f64,
     },
+    /// The first line has decimal commas between blanks or tabs.
+    #[error(
+        "the first line has decimal commas, such as in `{value}`: decimal points are needed, or semicolons between the columns and \
+         decimal commas"
+    )]
+    DecimalCommas {
+        /// Text of the first such field.
+        value: String,
+    },
+    /// A heading is no angle in radians.
+    #[error(
+        "is `{value}`, but a number from -3.2 to 3.2 is needed: are the headings in degrees, or counted from 0 to 2π?"
+    )]
+    HeadingUnit {
+        /// The heading.
+        value: f64,
+    },
+    /// A vehicle drives on a carriageway of highD without markings.
+    #[error(
+        "vehicle {vehicle} drives on a carriageway without markings: the metadata of the data set state no `{column}`, by which lateral \
+         positions are counted"
+    )]
+    NoMarkings {
+        /// Number of the vehicle.
+        vehicle: u64,
+        /// Column that states no markings.
+        column: &'static str,
+    },
     /// A vehicle has two rows for the same frame.
     #[error(
         "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed"
@@ -283,6 +311,15 @@ pub enum TrajectoryFileProblem {
     )]
     NoRoad {
         /// Share of these rows (%).
+        percent: f64,
+    },
+    /// The headings of vehicles contradict their movements.
+    #[error(
+        "in {percent:.0} % of the steps, a vehicle moves in another direction than its heading states, by more than 30°: headings and \
+         positions have different axes"
+    )]
+    HeadingsAgainstMotion {
+        /// Share of these steps (%).
         percent: f64,
     },
     /// No row belongs to the data set that is asked for.
@@ -422,7 +459,7 @@ pub enum TrajectoryFileProblem {
     #[error(
         "in {percent:.0} % of the rows of lanes {} to {}, as they are numbered from the left, a vehicle is not between the markings \
          of its carriageway: the driving directions contradict the markings, as in a file that is mirrored or of traffic that drives on \
-         the left, or the lateral position and the markings have other origins",
+         the left, or the lateral position and the markings have other origins or units",
         lanes[0], lanes[1]
     )]
     BesideCarriageway {
@@ -545,6 +582,8 @@ impl TrajectoryFileProblem {
                 | Self::Value { .. }
                 | Self::DecimalComma { .. }
                 | Self::NegativeSpeed { .. }
+                | Self::HeadingUnit { .. }
+                | Self::NoMarkings { .. }
                 | Self::DuplicateRow { .. }
                 | Self::UnevenTime { .. }
                 | Self::TimeBackwards { .. }
@@ -569,9 +608,11 @@ impl TrajectoryFileProblem {
         match self {
             Self::ColumnCount { .. } | Self::CutLine => "cut rows",
             Self::OpenQuote | Self::NotText => "rows that are no text",
-            Self::Value { .. } | Self::DecimalComma { .. } | Self::NegativeSpeed { .. } => {
-                "values that are not allowed"
-            }
+            Self::Value { .. }
+            | Self::DecimalComma { .. }
+            | Self::NegativeSpeed { .. }
+            | Self::HeadingUnit { .. }
+            | Self::NoMarkings { .. } => "values that are not allowed",
             Self::DuplicateRow { .. } => "duplicated rows",
             Self::UnevenTime { .. } | Self::OffClock { .. } => "times off the clock",
             Self::TimeBackwards { .. } => "times that go back",

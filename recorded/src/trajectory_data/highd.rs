@@ -145,14 +145,16 @@ impl HighdColumns {
     }
 
     /// Converts a position from the image frame into the road frame.
-    fn road_position(&self, is_upper: bool, (x_m, y_m): (f64, f64), lane_id: i64) -> Result<RoadPosition, FieldError> {
+    fn road_position(
+        &self,
+        vehicle: u64,
+        is_upper: bool,
+        (x_m, y_m): (f64, f64),
+        lane_id: i64,
+    ) -> Result<RoadPosition, FieldError> {
         let (upper, lower) = (&self.data.upper_m, &self.data.lower_m);
         let count = |markings: &[f64]| i64::try_from(markings.len()).unwrap_or(i64::MAX);
-        let unmarked = |which| {
-            let allowed =
-                format!("a vehicle of a carriageway with markings ({which} has none in the metadata of the data set)");
-            Err(FieldError::at("id", wrong_value("?", allowed)))
-        };
+        let unmarked = |column| Err(FieldError::from(TrajectoryFileProblem::NoMarkings { vehicle, column }));
         let (s_m, d_m, lane, lanes, before) = if is_upper {
             let Some(left_m) = upper.last().filter(|_| upper.len() > 1) else { return unmarked("upperLaneMarkings") };
             let before = if self.lower_lanes() > 0 { self.lower_lanes() as i64 + 1 } else { 0 };
@@ -207,7 +209,7 @@ impl TextLayout for HighdColumns {
         let length_m = real(width, "width", DIMENSION_M)?;
         let width_m = real(height, "height", allowed::WIDTH_M)?;
         let x_m = real(x, "x", allowed::POSITION_M)? + 0.5 * length_m;
-        let y_m = real(y, "y", allowed::LATERAL_M)? + 0.5 * width_m;
+        let y_m = real(y, "y", allowed::PLANE_M)? + 0.5 * width_m;
         let forward = if is_upper { -1.0 } else { 1.0 };
         let speed_mps = forward * real(velocity, "xVelocity", VELOCITY_MPS)?;
         let direction = &mut self.directions[usize::from(is_upper)];
@@ -219,7 +221,7 @@ impl TextLayout for HighdColumns {
             return Err(FieldError::at("xVelocity", wrong_value(text(velocity), needed)));
         }
         let lane_id = integer(text(lane), "laneId", allowed::LANES)?;
-        let RoadPosition { s_m, d_m, lane } = self.road_position(is_upper, (x_m, y_m), lane_id)?;
+        let RoadPosition { s_m, d_m, lane } = self.road_position(vehicle_id, is_upper, (x_m, y_m), lane_id)?;
         Ok(Some(Row {
             number: vehicle_id,
             origin: Time::ZERO,

@@ -84,7 +84,19 @@ pub(super) fn recognise(line: &str) -> Result<Format, TrajectoryFileProblem> {
         let columns = Box::new(NgsimColumns::ORIGINAL);
         return Ok(Format { columns, separator, width, has_header: false });
     }
+    if let Some(value) = decimal_comma(line) {
+        let value = value.chars().take(MAX_SHOWN_CHARS).collect();
+        return Err(TrajectoryFileProblem::DecimalCommas { value });
+    }
     Err(TrajectoryFileProblem::UnknownLayout { columns: width, start: line.chars().take(MAX_SHOWN_CHARS).collect() })
+}
+
+/// Returns the first field with a decimal comma of a row in NGSIM's columns between blanks or tabs.
+fn decimal_comma(line: &str) -> Option<&str> {
+    let fields: Vec<&str> = line.split_ascii_whitespace().collect();
+    let is_number = |field: &&str| field.replacen(',', ".", 1).parse::<f64>().is_ok();
+    let is_row = fields.len() == NGSIM_COLUMNS && fields.iter().all(is_number);
+    fields.into_iter().find(|field| is_row && field.contains(','))
 }
 
 /// Returns `true` if `header` is the header of highD's tracks file.

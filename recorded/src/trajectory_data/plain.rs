@@ -48,7 +48,8 @@ pub(super) mod allowed {
     pub(in super::super) const LANES: (i64, i64) = (0, 255);
     /// Times from the start of a file, or Unix times until the year 2100.
     pub(in super::super) const TIME_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
-    pub(in super::super) const POSITION_M: Bounds = Bounds::closed(-1e6, 1e6);
+    /// Positions along a road, which may be northings of UTM, up to 10⁷ m.
+    pub(in super::super) const POSITION_M: Bounds = Bounds::closed(-1e7, 1e7);
     pub(in super::super) const LATERAL_M: Bounds = Bounds::closed(-1e3, 1e3);
     pub(in super::super) const SPEED_MPS: Bounds = Bounds::closed(0.0, 150.0);
     /// Speeds along an axis that may point against the direction of travel.
@@ -59,6 +60,9 @@ pub(super) mod allowed {
     pub(in super::super) const LENGTH_M: Bounds = Bounds::above(0.0, 60.0);
     pub(in super::super) const WIDTH_M: Bounds = Bounds::above(0.0, 10.0);
 }
+
+/// Largest angle in degrees (°).
+const FULL_CIRCLE_DEG: f64 = 360.0;
 
 /// Time that counts from 1970 instead of from the start of a file: 10⁷ s, about four months.
 const LONG_TIME: Time = Time::from_ms(10_000_000_000);
@@ -150,7 +154,10 @@ impl TextLayout for PlainColumns {
         let checked = |column: Option<usize>, name, bounds| {
             column.map_or(Ok(None), |index| optional_number(fields.get(line, index), name, bounds))
         };
-        let heading_rad = checked(self.heading, "heading_rel_rad", allowed::HEADING_RAD)?;
+        let heading_rad = checked(self.heading, "heading_rel_rad", allowed::HEADING_RAD).map_err(|error| {
+            let heading = self.heading.map_or("", |index| fields.get(line, index));
+            beyond_radians(heading).unwrap_or(error)
+        })?;
         let point = checked(self.x, "x_m", allowed::PLANE_M)?.zip(checked(self.y, "y_m", allowed::PLANE_M)?);
         let track = whole(self.track, "track_id", allowed::TRACKS)?;
         let stated_vehicle = self.vehicle.filter(|index| !fields.get(line, *index).is_empty());
@@ -187,6 +194,13 @@ impl TextLayout for PlainColumns {
 pub(super) fn to_microseconds(time: Time) -> Time {
     const NS_PER_US: i64 = 1_000;
     if time < LONG_TIME { time } else { Time::from_ns((time.ns() + NS_PER_US / 2) / NS_PER_US * NS_PER_US) }
+}
+
+/// Returns the problem of a heading that is an angle in another unit, or counts from 0.
+fn beyond_radians(text: &str) -> Option<FieldError> {
+    let value: f64 = text.parse().ok()?;
+    let is_angle = value.abs() <= FULL_CIRCLE_DEG;
+    is_angle.then(|| FieldError::at("heading_rel_rad", TrajectoryFileProblem::HeadingUnit { value }))
 }
 
 /// Parses a speed (m/s), which may be negative if the position along the road is reversed.

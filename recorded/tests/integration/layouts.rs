@@ -230,6 +230,17 @@ fn highd_traffic_beside_its_carriageway_is_refused() {
 }
 
 #[test]
+fn a_carriageway_of_highd_without_markings_is_refused_by_that_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    assert!(read(folder.path()).is_ok());
+    let meta = "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,,21.0;25.0;29.0\n";
+    std::fs::write(folder.path().join("07_recordingMeta.csv"), meta).unwrap();
+    let message = read(folder.path()).unwrap_err().to_string();
+    assert!(message.contains("vehicle 1") && message.contains("no `upperLaneMarkings`"), "{message}");
+}
+
+#[test]
 fn driving_directions_of_highd_against_its_velocities_are_refused_as_a_whole() {
     let skip = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
     let swap_directions = |folder: &Path| {

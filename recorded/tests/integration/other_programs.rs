@@ -282,6 +282,12 @@ fn traffic_without_a_road_is_refused_with_the_reason() {
 }
 
 #[test]
+fn headings_in_other_axes_than_the_positions_are_refused_by_that_reason() {
+    let text = sumo_xml(false).replace("angle=\"90.00\"", "angle=\"0.00\"");
+    assert_mentions(&read_text(text.as_bytes()).unwrap_err(), &["than its heading states", "different axes"], "headings");
+}
+
+#[test]
 fn without_lanes_the_longest_path_of_a_lane_changer_is_no_reference_line() {
     let mut text = "<fcd-export>\n".to_owned();
     for time_s in times_s() {
