@@ -25,7 +25,7 @@ const GZ: &str = ".gz";
 
 const FRAME_RATE_HZ: Bounds = Bounds::closed(1.0, 1_000.0);
 /// Allowed lateral positions of markings (m).
-const MARKING_M: Bounds = Bounds::closed(-1e4, 1e4);
+const MARKING_M: Bounds = Bounds::closed(-1e7, 1e7);
 
 /// Allowed number of rows per vehicle.
 const ROWS: (i64, i64) = (0, 1_000_000_000);

@@ -185,7 +185,7 @@ impl Reader {
                 return Err(wrong("timestamp", &time_s.to_string(), &format!("a time after {}", timestamp[k - 1])));
             }
             if !allowed::POSITION_M.contains(along_m[k]) {
-                return Err(wrong("x_position", &x_position[k].to_string(), "a position of up to 3280839 feet"));
+                return Err(wrong("x_position", &x_position[k].to_string(), "a position of up to 32808399 feet"));
             }
             if !allowed::LATERAL_M.contains(y_position[k]) {
                 return Err(wrong("y_position", &y_position[k].to_string(), "a position of up to 1000 feet"));

@@ -55,6 +55,13 @@ fn mixed_up_units_and_columns_are_detected() {
 }
 
 #[test]
+fn a_position_along_the_road_may_count_from_far_away() {
+    let data = read_text(drive(|at| at[1] += 4_182_000.0).as_bytes()).unwrap();
+    assert_eq!(data.trajectories[0].points.len(), 40);
+    assert!(read_text(drive(|at| at[1] += 2e7).as_bytes()).is_err());
+}
+
+#[test]
 fn negative_speeds_of_a_reversed_axis_are_turned_on_request() {
     let speed_mps = |at: &[f64; 6]| 25.0 + 0.5 * at[0];
     let clean = drive(|at| at[3] = speed_mps(at));
