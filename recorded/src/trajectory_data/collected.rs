@@ -24,6 +24,7 @@ use super::markings::LaneMarkings;
 use super::plain::allowed;
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
+use super::stated_lanes::StatedLane;
 
 /// Largest number of rows of a file that is read as a whole: they take about 3 GiB.
 const MAX_ROWS: usize = 20_000_000;
@@ -66,8 +67,8 @@ pub(super) enum Position {
         heading_rad: f64,
         /// `true` if the vehicle leaves its lane in this row.
         changes_lane: bool,
-        /// The lane that the file names, as a number of its own.
-        named_lane: Option<u64>,
+        /// The lane that the file names.
+        named_lane: Option<StatedLane>,
     },
     /// On a road, of which a file may hold several. `s_m` is the centre of the vehicle's box.
     Road { road: u32, s_m: f64, d_m: f64, lane: u8 },
@@ -161,7 +162,8 @@ impl Collected {
             }
             _ => error,
         })?;
-        notes.extend(road.as_ref().and_then(InferredRoad::warning));
+        notes.extend(road.iter().flat_map(InferredRoad::warnings));
+        let is_in_doubt = road.as_ref().is_some_and(InferredRoad::is_in_doubt);
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
         let mut jumps = 0;
@@ -233,7 +235,7 @@ impl Collected {
         let markings = facts.markings.or_else(|| road.as_ref().map(InferredRoad::markings));
         let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
         let (items, unknown_classes) = (items.collect(), facts.unknown_classes);
-        Ok(CollectedSource { items, info, notes, unknown_classes, lane_sides: LaneSides::default() })
+        Ok(CollectedSource { items, info, notes, is_in_doubt, unknown_classes, lane_sides: LaneSides::default() })
     }
 }
 
@@ -392,6 +394,7 @@ pub(super) struct CollectedSource {
     items: VecDeque<Result<Row, ReadError>>,
     info: FileInfo,
     notes: Vec<String>,
+    is_in_doubt: bool,
     unknown_classes: UnknownClasses,
     lane_sides: LaneSides,
 }
@@ -418,6 +421,10 @@ impl RowSource for CollectedSource {
 
     fn check_lane_sides(&self, is_mirrored: bool) -> Result<(), ReadError> {
         self.lane_sides.check(is_mirrored).map_err(ReadError::of_file)
+    }
+
+    fn is_in_doubt(&self) -> bool {
+        self.is_in_doubt
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

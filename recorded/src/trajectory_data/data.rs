@@ -58,7 +58,8 @@ pub struct TrajectoryData {
     /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from
     /// a file.
     pub hash: String,
-    /// Whether a warning says that lane changes may be missing, or that the recorded lanes are none.
+    /// Whether a warning says that lane changes may be wrong or missing, or that the recorded lanes
+    /// are none.
     pub is_in_doubt: bool,
     /// Whether a warning says that the recorded lanes are none.
     pub doubts_lanes: bool,

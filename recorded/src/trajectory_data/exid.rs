@@ -11,8 +11,8 @@
 //!
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
 //! another format. The reader therefore infers the road from the traffic before it reads the rows;
-//! see `inferred_road`. A lanelet becomes the lane at its vehicles' mean position. A vehicle changes
-//! its lane where `laneChange` is 1, or where its offset from the lane's centre jumps.
+//! see `inferred_road`. Lanelets that follow one another are one lane; see `stated_lanes`. A vehicle
+//! changes its lane where `laneChange` is 1, or where its offset from the lane's centre jumps.
 //!
 //! **inD, rounD.** Their columns are the first ones of exiD's. They record intersections and
 //! roundabouts, which are no roads with lanes: they are read with a warning, or refused if most
@@ -39,6 +39,7 @@ use super::plain::allowed;
 use super::reference_line::Point;
 use super::rows::{Fields, Lines, Separator};
 use super::source::{Clock, FileInfo, ReadError, Row};
+use super::stated_lanes::StatedLane;
 use super::text_layout::TextLayout;
 
 const HEADING_DEG: Bounds = Bounds::closed(-360.0, 720.0);
@@ -89,9 +90,10 @@ impl ColumnIndices {
         })
     }
 
-    /// Returns the number of the lanelet that a row names.
-    fn named_lane(&self, line: &str, fields: &Fields) -> Option<u64> {
-        first_of(fields.get(line, self.lanelet?)).parse().ok()
+    /// Returns the lanelet that a row names.
+    fn named_lane(&self, line: &str, fields: &Fields) -> Option<StatedLane> {
+        let lanelet = first_of(fields.get(line, self.lanelet?)).parse().ok()?;
+        Some(StatedLane { edge: lanelet, index: None })
     }
 
     /// Returns the vehicle number, the position and the heading (rad) of a row.
@@ -223,7 +225,11 @@ impl TextLayout for ExidColumns {
              from the traffic, and the quantities of motorway traffic may mean nothing here"
                 .to_owned()
         });
-        urban.into_iter().chain(self.road.warning()).collect()
+        urban.into_iter().chain(self.road.warnings()).collect()
+    }
+
+    fn is_in_doubt(&self) -> bool {
+        self.road.is_in_doubt()
     }
 
     fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {

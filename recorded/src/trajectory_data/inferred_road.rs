@@ -5,24 +5,29 @@
 //!   ── ── ── ── ── ── ── ── ──   the lanes beside it, as far as 2 % of the rows reach
 //!   ═══════════════════════════
 //!   ── ── ── ── ── ── ── ── ──
-//!     reference line: the longest path of a vehicle that keeps its lane
+//!     reference line: the axis of the road, from the paths of all vehicles
 //! ```
 //!
 //! Each direction of travel has a reference line. Directions are placed 1 km beside each other, so
 //! that their vehicles never meet. Vehicles on ramps count as being in the outermost lane.
 //!
-//! **Recorded lanes.** If rows name the lane of their vehicle (an edge with an index, a lanelet), each
-//! name gets the lane number of its vehicles' mean position; names beside each other get different
-//! numbers. A vehicle is then in the lane that the file names. Markings lie halfway between the median
-//! positions in neighbouring lanes. A name whose vehicles are spread over more than a lane is ignored.
-//! Without names, lanes are steps of the mean lane width, and a vehicle is in the lane at its position.
+//! **Recorded lanes.** If rows name the lane of their vehicle (an edge with an index, a lanelet), a
+//! vehicle is in the lane that the file names, wherever it drives. Names that follow one another
+//! along the road are one lane; see `stated_lanes`. Lanes beside each other are numbered by their
+//! indices, or by where they lie; see `lane_numbers`. Markings lie halfway between the median positions
+//! in neighbouring lanes. Without names, lanes are steps of the mean lane width, and a vehicle is in
+//! the lane at its position.
 //!
-//! **Weaving.** The reference line contains the weaving and the errors of one vehicle. If rows name
-//! lanes, the line is smoothed first. Along the road, the median departure of all vehicles that keep
-//! their lanes from the median position of their lane then shows the weaving, and it is subtracted.
-//! Where fewer than ten vehicles show it, or rows name no lanes, a decimetre or two remain. If rows name
-//! no lanes and most vehicles move to one side of a reference line by more than half a lane, its vehicle
-//! changes lanes, and another path is taken.
+//! **Reference line.** It begins as the longest path of a vehicle that keeps its lane, which contains
+//! the weaving and the errors of that vehicle. If rows name lanes, the path is smoothed, and then moved
+//! to where all vehicles show the axis of the road; see `road_axis`. Where fewer than ten vehicles show
+//! it, or rows name no lanes, a decimetre or two remain. If rows name no lanes and most vehicles move to
+//! one side of a reference line by more than half a lane, its vehicle changes lanes, and another path
+//! is taken.
+//!
+//! **Doubts.** The lanes on the derived road are compared with the lane changes that the file states;
+//! see `lane_comparison`. A result is in doubt if they disagree, if vehicles of one lane are spread
+//! over more than a lane, or if the indices grow to the right although the layouts count from there.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,8 +35,12 @@ use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{Lane, maths};
 
 use super::error::TrajectoryFileProblem;
+use super::lane_comparison::{ComparedRow, LaneComparison};
+use super::lane_numbers::{LEAST_APART, LaneNumbers, StrandRows, lanes_of};
 use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
-use super::reference_line::{Point, ReferenceLine};
+use super::reference_line::{Point, Projection, ReferenceLine};
+use super::road_axis::{AXIS_SECTION_M, Departures, LateralFit, LateralPositions};
+use super::stated_lanes::{LaneObserver, LaneRow, StatedLane, Strand, Strands};
 
 /// Lane width if the traffic gives none (m).
 const FALLBACK_LANE_WIDTH_M: f64 = DEFAULT_LANE_WIDTH_M;
@@ -48,9 +57,6 @@ const MAX_DIRECTIONS: usize = 4;
 /// Minimum share of its direction's rows that a lane holds.
 const MIN_SHARE: f64 = 0.02;
 
-/// Maximum number of lanes considered on either side of the reference line.
-const MAX_LANES_BESIDE: i64 = 20;
-
 /// Distance by which each direction is shifted to the right of the previous one (m).
 const SEPARATION_M: f64 = 1_000.0;
 
@@ -66,13 +72,14 @@ const ASTRAY_M: f64 = 35.0;
 const WARNED_SHARE: f64 = 0.05;
 const REFUSED_SHARE: f64 = 0.5;
 
-/// Largest standard deviation of the vehicles of a named lane, as a share of the lane width (-): that
-/// of vehicles within a lane is 0.1, that of vehicles in two lanes 0.5.
-const LARGEST_SPREAD: f64 = 0.4;
+/// Median deviation of vehicles from the middle of their lane above which they are spread over more
+/// than a lane, as a share of the lane width (-): drivers in a lane have 0.07, drivers in two lanes 0.5.
+/// An assumption with a plausible range of 0.2 to 0.4.
+const LARGEST_SPREAD: f64 = 0.3;
 
-/// Least distance between the mean positions of two named lanes beside each other, as a share of the
-/// lane width (-): vehicles that merge keep to the near side of a lane.
-const LEAST_APART: f64 = 0.4;
+/// Share of positions in such lanes above which a reader of results is warned (-). An assumption with
+/// a plausible range of 0.05 to 0.2.
+const WARNED_SPREAD: f64 = 0.1;
 
 /// Length of the sections in which the weaving of the reference line is measured, and half the length
 /// over which the line is smoothed (m): parts of the 150 to 300 m in which a driver weaves.
@@ -88,8 +95,13 @@ const LEAST_DRIVERS: usize = 10;
 const LEAVES_LANE: f64 = 0.5;
 /// Largest number of times that reference lines are chosen, because their vehicles leave their lanes.
 const MOST_CHOICES: usize = 8;
-/// Number of times that lanes and weaving are estimated in turns.
-const TURNS: usize = 5;
+/// Number of times that the reference line is moved to the axis of the road: after each time,
+/// positions are measured from a better line.
+const AXIS_TURNS: usize = 3;
+
+/// The doubt about a file whose indices grow to the right.
+const MIRRORED: &str = "lanes with higher indices lie further to the right, but the layout counts them from the right: the file is mirrored, \
+     so that left is called right, or its traffic drives on the left";
 
 /// The position of one vehicle in one row, and what it says of the lanes.
 #[derive(Clone, Copy, Debug)]
@@ -101,8 +113,8 @@ pub(super) struct Pose {
     pub(super) lane_width_m: Option<f64>,
     /// `true` if the vehicle leaves its lane in this row.
     pub(super) changes_lane: bool,
-    /// The lane that the file names, as a number of its own.
-    pub(super) named_lane: Option<u64>,
+    /// The lane that the file names.
+    pub(super) named_lane: Option<StatedLane>,
 }
 
 /// A position on the road.
@@ -123,11 +135,12 @@ struct Direction {
     /// Number of lanes to the left of the reference line's own lane.
     left: i64,
     lanes: i64,
-    /// For each named lane, by how many lanes it lies to the left of the reference line's lane.
-    named: BTreeMap<u64, i64>,
-    /// Positions along the line and the distance of the lanes there to the left of where they usually
-    /// are (m), in order.
-    weaving_m: Vec<(f64, f64)>,
+    /// Which named lanes follow one another.
+    strands: Strands,
+    /// For each strand, by how many lanes it lies to the left of the reference line's lane.
+    numbers: BTreeMap<Strand, i64>,
+    /// By how much the lanes are to the left of where they usually are.
+    weaving: Departures,
     /// Distances to the left of the line (m) of the edges of the lanes, from left to right.
     edges_m: Vec<f64>,
     /// Offset of the lane numbers, so that directions share no lane.
@@ -136,42 +149,52 @@ struct Direction {
     shift_m: f64,
 }
 
-/// The rows of one named lane.
-#[derive(Clone, Debug, Default)]
-struct NamedLane {
-    rows: f64,
-    sum_m: f64,
-    squares_m2: f64,
-    /// Positions of the vehicles that keep their lanes (m), one for each vehicle, by the section of the
-    /// road.
-    sections: BTreeMap<i64, Vec<f64>>,
-    /// The first and the last section of its rows.
-    reach: Option<(i64, i64)>,
+/// What the rows of one direction show of its lanes.
+#[derive(Clone, Debug)]
+struct ObservedLanes {
+    observer: LaneObserver,
+    positions: LateralPositions<StatedLane>,
+    /// Vehicle, lane and section of the latest position.
+    latest: Option<(u64, StatedLane, i64)>,
 }
 
-impl NamedLane {
-    fn add(&mut self, d_m: f64, section: i64) {
-        let (first, last) = self.reach.unwrap_or((section, section));
-        self.reach = Some((first.min(section), last.max(section)));
-        self.rows += 1.0;
-        self.sum_m += d_m;
-        self.squares_m2 += d_m * d_m;
+impl ObservedLanes {
+    /// Creates an observation in sections of this length.
+    fn new(section_m: f64) -> Self {
+        let (observer, positions) = (LaneObserver::default(), LateralPositions::new(section_m));
+        Self { observer, positions, latest: None }
     }
 
-    /// Returns true if both lanes are recorded in a section of the road, or in the next one.
-    fn is_beside(&self, other: &Self) -> bool {
-        self.reach.zip(other.reach).is_some_and(|((first, last), (others_first, others_last))| {
-            first <= others_last + 1 && others_first <= last + 1
-        })
+    /// Adds the position of a vehicle that follows the road: one for each section.
+    fn add_position(&mut self, vehicle: u64, lane: StatedLane, projection: &Projection) -> Option<i64> {
+        let section = self.positions.section(projection.s_m);
+        let here = Some((vehicle, lane, section));
+        if std::mem::replace(&mut self.latest, here) == here {
+            return None;
+        }
+        self.positions.add(section, lane, projection.d_m);
+        Some(section)
     }
+}
 
-    fn mean_m(&self) -> f64 {
-        self.sum_m / self.rows
-    }
+/// Gives each vehicle the direction of its first row, as when its rows are read.
+#[derive(Clone, Debug, Default)]
+struct KeptDirection {
+    latest: Option<(u64, usize)>,
+}
 
-    fn sd_m(&self) -> f64 {
-        (self.squares_m2 / self.rows - self.mean_m() * self.mean_m()).max(0.0).sqrt()
+impl KeptDirection {
+    fn choose(&mut self, pose: &Pose, road: &InferredRoad) -> Option<usize> {
+        let kept = self.latest.filter(|(vehicle, _)| *vehicle == pose.vehicle).map(|(_, direction)| direction);
+        let direction = kept.or_else(|| road.direction(pose.heading_rad))?;
+        self.latest = Some((pose.vehicle, direction));
+        Some(direction)
     }
+}
+
+/// Returns `true` if the vehicle in `pose` follows the road whose line has this projection.
+fn follows(pose: &Pose, projection: &Projection) -> bool {
+    maths::cos(pose.heading_rad - projection.heading_rad) >= maths::cos(ASTRAY_RAD) && projection.d_m.abs() <= ASTRAY_M
 }
 
 /// The road of a data set, as inferred from its traffic.
@@ -181,6 +204,8 @@ pub(super) struct InferredRoad {
     directions: Vec<Direction>,
     /// Share of the rows whose vehicles do not follow the road (-).
     astray: f64,
+    /// Why the lanes of the road are in doubt.
+    doubts: Vec<String>,
 }
 
 /// The path of one vehicle.
@@ -195,8 +220,8 @@ struct DrivenPath {
 
 impl InferredRoad {
     /// Infers the road from the rows that `each_row` visits. It is called several times: for the
-    /// reference lines, and for the lanes beside them. The rows of a vehicle have to follow one
-    /// another.
+    /// reference lines, for the lanes beside them, and for the comparison with the file. The rows of a
+    /// vehicle have to follow one another.
     ///
     /// # Errors
     /// The error of `each_row`, or the reason why the traffic shows no road.
@@ -220,68 +245,119 @@ impl InferredRoad {
             let heading_rad = path.heading_rad;
             Some(Direction { reference: path.vehicle, ..Direction::along(line, heading_rad) })
         });
-        let mut road = Self { lane_width_m, directions: directions.collect(), astray: 0.0 };
+        let mut road = Self { lane_width_m, directions: directions.collect(), astray: 0.0, doubts: Vec::new() };
         if road.directions.is_empty() {
             return Ok(Err(TrajectoryFileProblem::NothingMoves));
         }
-        road.count_lanes(each_row, &changing)?;
+        road.find_axes(&mut each_row)?;
+        road.count_lanes(&mut each_row)?;
         if road.astray > REFUSED_SHARE {
             return Ok(Err(TrajectoryFileProblem::NoRoad { percent: 100.0 * road.astray }));
         }
+        road.compare_lanes(&mut each_row)?;
         Ok(Ok(road))
     }
 
-    /// Counts the rows in each lane, and from them sets the lanes of each direction. `changing` holds
-    /// the vehicles that change lanes.
-    fn count_lanes<E>(
-        &mut self,
-        mut each_row: impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
-        changing: &BTreeSet<u64>,
-    ) -> Result<(), E> {
-        let mut rows: BTreeMap<(usize, Option<u64>, i64), u64> = BTreeMap::new();
-        let mut named: BTreeMap<(usize, u64), NamedLane> = BTreeMap::new();
-        let mut latest_section: Option<(u64, u64, i64)> = None;
-        let (mut astray, mut all) = (0_u64, 0_u64);
-        let mut latest: Option<(u64, usize)> = None;
+    /// Joins the named lanes that follow one another, and moves the reference lines to the axes that
+    /// all vehicles show. Without named lanes, nothing changes.
+    fn find_axes<E>(&mut self, each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>) -> Result<(), E> {
+        for turn in 0..AXIS_TURNS {
+            let mut observed = vec![ObservedLanes::new(AXIS_SECTION_M); self.directions.len()];
+            let mut names_lanes = false;
+            let mut kept = KeptDirection::default();
+            each_row(&mut |pose| {
+                let Some((direction, lane)) = kept.choose(&pose, self).zip(pose.named_lane) else { return };
+                names_lanes = true;
+                let projection = self.directions[direction].line.project(pose.point);
+                let observed = &mut observed[direction];
+                if turn == 0 {
+                    let Pose { vehicle, changes_lane, .. } = pose;
+                    observed.observer.add(LaneRow { vehicle, lane, changes_lane, s_m: projection.s_m });
+                }
+                if follows(&pose, &projection) {
+                    observed.add_position(pose.vehicle, lane, &projection);
+                }
+            })?;
+            if !names_lanes {
+                return Ok(());
+            }
+            for (direction, observed) in self.directions.iter_mut().zip(observed) {
+                if turn == 0 {
+                    direction.strands = observed.observer.strands();
+                }
+                let positions = observed.positions.in_lanes(|lane| direction.strands.of_lane(lane));
+                direction.line = positions.axis(&direction.line);
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares the lanes in which the rows are placed with the lane changes that the file states.
+    fn compare_lanes<E>(&mut self, each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>) -> Result<(), E> {
+        let mut comparison = LaneComparison::default();
+        let mut kept = KeptDirection::default();
         each_row(&mut |pose| {
-            // A vehicle keeps the direction of its first row, as when its rows are read.
-            let kept = latest.filter(|(vehicle, _)| *vehicle == pose.vehicle).map(|(_, direction)| direction);
-            let Some(direction) = kept.or_else(|| self.direction(pose.heading_rad)) else { return };
-            latest = Some((pose.vehicle, direction));
-            let projection = self.directions[direction].line.project(pose.point);
-            let follows = maths::cos(pose.heading_rad - projection.heading_rad) >= maths::cos(ASTRAY_RAD)
-                && projection.d_m.abs() <= ASTRAY_M;
+            let Some(direction) = kept.choose(&pose, self).filter(|_| pose.named_lane.is_some()) else { return };
+            let placed = self.place(direction, pose.point, pose.named_lane);
+            let Some(Placed { s_m, d_m, lane }) = placed else { return };
+            let Pose { vehicle, changes_lane, .. } = pose;
+            comparison.add(ComparedRow { vehicle, changes_lane, s_m, d_m, lane }, self.lane_width_m);
+        })?;
+        comparison.end_vehicle(self.lane_width_m);
+        self.doubts.extend(comparison.doubts());
+        Ok(())
+    }
+
+    /// Counts the rows in each lane, and from them sets the lanes of each direction.
+    fn count_lanes<E>(&mut self, each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>) -> Result<(), E> {
+        let mut rows: BTreeMap<(usize, Option<Strand>, i64), u64> = BTreeMap::new();
+        let mut strands: BTreeMap<(usize, Strand), StrandRows> = BTreeMap::new();
+        let mut observed = vec![ObservedLanes::new(SECTION_M); self.directions.len()];
+        let (mut astray, mut all) = (0_u64, 0_u64);
+        let mut kept = KeptDirection::default();
+        each_row(&mut |pose| {
+            let Some(index) = kept.choose(&pose, self) else { return };
+            let direction = &self.directions[index];
+            let projection = direction.line.project(pose.point);
+            let follows = follows(&pose, &projection);
             all += 1;
             astray += u64::from(!follows);
-            *rows.entry((direction, pose.named_lane, self.lane_beside(projection.d_m))).or_default() += 1;
-            if let Some(name) = pose.named_lane {
-                let lane = named.entry((direction, name)).or_default();
-                let section = section(projection.s_m);
-                lane.add(projection.d_m, section);
-                let here = Some((pose.vehicle, name, section));
-                if follows && latest_section != here && !changing.contains(&pose.vehicle) {
-                    lane.sections.entry(section).or_default().push(projection.d_m);
-                }
-                latest_section = here;
+            let lane = pose.named_lane;
+            let strand = lane.and_then(|lane| direction.strands.of_lane(lane));
+            *rows.entry((index, strand, self.lane_beside(projection.d_m))).or_default() += 1;
+            let Some((lane, strand)) = lane.zip(strand) else { return };
+            let measured = strands.entry((index, strand)).or_default();
+            measured.add(projection.d_m);
+            let section = if follows { observed[index].add_position(pose.vehicle, lane, &projection) } else { None };
+            if let Some(section) = section {
+                measured.add_in_section(section, projection.d_m);
             }
         })?;
         self.astray = if all > 0 { astray as f64 / all as f64 } else { 0.0 };
+        let mut by_direction = vec![BTreeMap::new(); self.directions.len()];
+        for ((index, strand), measured) in strands {
+            by_direction[index].insert(strand, measured);
+        }
+        let mut doubts = BTreeSet::new();
         let (mut first_lane, mut shift_m) = (0, 0.0);
-        for (index, direction) in self.directions.iter_mut().enumerate() {
-            let of_direction = named.iter().filter(|((other, _), _)| *other == index);
-            let usable = of_direction.filter(|(_, lane)| lane.sd_m() <= LARGEST_SPREAD * self.lane_width_m);
-            let usable: Vec<(u64, &NamedLane)> = usable.map(|((_, name), lane)| (*name, lane)).collect();
-            direction.named = numbered(&usable, self.lane_width_m);
+        let of_directions = by_direction.into_iter().zip(observed).enumerate();
+        for (direction, (index, (measured, observed))) in self.directions.iter_mut().zip(of_directions) {
+            let LaneNumbers { numbers, is_mirrored } =
+                LaneNumbers::of_strands(measured, &direction.strands, self.lane_width_m);
+            direction.numbers = numbers;
+            if is_mirrored {
+                doubts.insert(MIRRORED.to_owned());
+            }
             let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
-            for ((_, name, beside), count) in rows.iter().filter(|((other, ..), _)| *other == index) {
-                let lane = name.and_then(|name| direction.named.get(&name)).unwrap_or(beside);
+            for ((_, strand, beside), count) in rows.iter().filter(|((other, ..), _)| *other == index) {
+                let lane = strand.and_then(|strand| direction.numbers.get(&strand)).unwrap_or(beside);
                 *counts.entry(*lane).or_default() += count;
             }
             let least = MIN_SHARE * counts.values().sum::<u64>() as f64;
             let used = || counts.iter().filter(|(_, count)| **count as f64 >= least).map(|(lane, _)| *lane);
             let (mut left, mut right) = (used().max().unwrap_or(0).max(0), used().min().unwrap_or(0).min(0));
             // A named lane next to the others counts, however few vehicles use it. Ramps apart do not.
-            let is_named = |lane: i64| direction.named.values().any(|named| *named == lane);
+            let is_named = |lane: i64| direction.numbers.values().any(|named| *named == lane);
             while is_named(left + 1) {
                 left += 1;
             }
@@ -290,10 +366,12 @@ impl InferredRoad {
             }
             (direction.left, direction.lanes) = (left, left - right + 1);
             (direction.first_lane, direction.shift_m) = (first_lane, shift_m);
-            direction.place_lanes(&usable, self.lane_width_m);
+            let positions = observed.positions.in_lanes(|lane| direction.number(lane));
+            doubts.extend(direction.place_lanes(&positions, self.lane_width_m));
             first_lane += direction.lanes + 1;
             shift_m -= direction.width_m() + SEPARATION_M;
         }
+        self.doubts.extend(doubts);
         Ok(())
     }
 
@@ -302,24 +380,30 @@ impl InferredRoad {
         self.directions.get(direction)?.reference
     }
 
+    /// Returns `true` if the lanes of the road are in doubt, as a warning says.
+    pub(super) fn is_in_doubt(&self) -> bool {
+        !self.doubts.is_empty()
+    }
+
     /// Returns what a reader of results has to know of the road.
-    pub(super) fn warning(&self) -> Option<String> {
-        (self.astray > WARNED_SHARE).then(|| {
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let astray = (self.astray > WARNED_SHARE).then(|| {
             format!(
                 "in {:.0} % of the rows, a vehicle does not follow the road that was derived from the traffic: on intersections and \
                  roundabouts, lanes and lane changes mean nothing",
                 100.0 * self.astray
             )
-        })
+        });
+        astray.into_iter().chain(self.doubts.iter().cloned()).collect()
     }
 
     /// Places a point on the road in the given direction, in the lane that the file names, if it does.
     /// Returns `None` if there is no such direction.
-    pub(super) fn place(&self, direction: usize, point: Point, named_lane: Option<u64>) -> Option<Placed> {
+    pub(super) fn place(&self, direction: usize, point: Point, named_lane: Option<StatedLane>) -> Option<Placed> {
         let direction = self.directions.get(direction)?;
         let projection = direction.line.project(point);
-        let d_m = projection.d_m - direction.weaving_at(projection.s_m);
-        let lane = match named_lane.and_then(|name| direction.named.get(&name)) {
+        let d_m = projection.d_m - direction.weaving.at(projection.s_m);
+        let lane = match named_lane.and_then(|lane| direction.number(lane)) {
             Some(lanes) => direction.left - lanes + 1,
             None => direction.edges_m.iter().skip(1).filter(|edge_m| d_m < **edge_m).count() as i64 + 1,
         };
@@ -359,37 +443,22 @@ impl InferredRoad {
 impl Direction {
     /// Creates a direction of a single lane.
     fn along(line: ReferenceLine, heading_rad: f64) -> Self {
-        let (named, weaving_m, edges_m) = (BTreeMap::new(), Vec::new(), Vec::new());
-        let (reference, first_lane, shift_m) = (None, 0, 0.0);
-        Self { heading_rad, reference, line, left: 0, lanes: 1, named, weaving_m, edges_m, first_lane, shift_m }
+        let (strands, numbers, weaving) = (Strands::default(), BTreeMap::new(), Departures::default());
+        let (reference, first_lane, shift_m, edges_m) = (None, 0, 0.0, Vec::new());
+        let (left, lanes) = (0, 1);
+        Self { heading_rad, reference, line, left, lanes, strands, numbers, weaving, edges_m, first_lane, shift_m }
     }
 
-    /// Sets the edges of the lanes, and the weaving of the reference line, from the named lanes.
-    fn place_lanes(&mut self, named: &[(u64, &NamedLane)], lane_width_m: f64) {
-        let mut sections: BTreeMap<i64, Vec<(i64, f64)>> = BTreeMap::new();
-        for (name, lane) in named {
-            let lanes = self.named.get(name).copied().unwrap_or_default();
-            for (section, positions_m) in &lane.sections {
-                sections.entry(*section).or_default().extend(positions_m.iter().map(|d_m| (lanes, *d_m)));
-            }
-        }
-        let mut middles_m: BTreeMap<i64, f64> = BTreeMap::new();
-        for _ in 0..TURNS {
-            let mut positions_m: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
-            for (section, vehicles) in &sections {
-                let weaving_m = self.weaving_at(middle_of(*section));
-                for (lanes, d_m) in vehicles {
-                    positions_m.entry(*lanes).or_default().push(d_m - weaving_m);
-                }
-            }
-            middles_m = positions_m.into_iter().map(|(lanes, values)| (lanes, median(values))).collect();
-            let shown = sections.iter().filter(|(_, vehicles)| vehicles.len() >= LEAST_DRIVERS);
-            let weaving = shown.map(|(section, vehicles)| {
-                let departures = vehicles.iter().filter_map(|(lanes, d_m)| Some(d_m - middles_m.get(lanes)?));
-                (middle_of(*section), median(departures.collect()))
-            });
-            self.weaving_m = weaving.collect();
-        }
+    /// Returns by how many lanes a named lane lies to the left of the reference line's lane.
+    fn number(&self, lane: StatedLane) -> Option<i64> {
+        self.numbers.get(&self.strands.of_lane(lane)?).copied()
+    }
+
+    /// Sets the edges of the lanes, and the weaving of the reference line, from the positions of
+    /// vehicles in the lanes. Returns why the lanes are in doubt, if they are.
+    fn place_lanes(&mut self, positions: &LateralPositions<i64>, lane_width_m: f64) -> Option<String> {
+        let fit = positions.fit();
+        let middles_m = in_order(&fit, lane_width_m);
         let middle_m = |lanes: i64| middles_m.get(&lanes).copied();
         let edge_m = |right_of: i64| match (middle_m(right_of), middle_m(right_of - 1)) {
             (Some(left_m), Some(right_m)) => 0.5 * (left_m + right_m),
@@ -398,6 +467,9 @@ impl Direction {
             (None, None) => (right_of as f64 - 0.5) * lane_width_m,
         };
         self.edges_m = (0..=self.lanes).map(|lane| edge_m(self.left + 1 - lane)).collect();
+        let doubt = spread(positions, &fit, lane_width_m);
+        self.weaving = fit.departures;
+        doubt
     }
 
     /// Returns the left edge of the leftmost lane (m to the left of the line).
@@ -409,38 +481,53 @@ impl Direction {
     fn width_m(&self) -> f64 {
         self.left_edge_m() - self.edges_m.last().copied().unwrap_or_default()
     }
-
-    /// Returns by how much the lanes are to the left of where they usually are (m), because the
-    /// reference line weaves.
-    fn weaving_at(&self, s_m: f64) -> f64 {
-        let next = self.weaving_m.partition_point(|(at_m, _)| *at_m < s_m);
-        match (next.checked_sub(1).and_then(|before| self.weaving_m.get(before)), self.weaving_m.get(next)) {
-            (Some((from_m, from)), Some((to_m, to))) => from + (to - from) * (s_m - from_m) / (to_m - from_m),
-            (Some((_, value)), None) | (None, Some((_, value))) => *value,
-            (None, None) => 0.0,
-        }
-    }
 }
 
-/// Returns the number of each named lane: by how many lanes it lies to the left of the reference line.
-/// The nearest lanes are numbered first.
-fn numbered(named: &[(u64, &NamedLane)], lane_width_m: f64) -> BTreeMap<u64, i64> {
-    let mut by_distance = named.to_vec();
-    by_distance.sort_by(|(_, a), (_, b)| a.mean_m().abs().total_cmp(&b.mean_m().abs()));
-    let mut placed: Vec<(u64, &NamedLane, i64)> = Vec::new();
-    for (name, lane) in by_distance {
-        let mut number = lanes_of(lane.mean_m(), lane_width_m);
-        for (_, other, others_number) in placed.iter().filter(|(_, other, _)| lane.is_beside(other)) {
-            let left_m = lane.mean_m() - other.mean_m();
-            if left_m > LEAST_APART * lane_width_m {
-                number = number.max(others_number + 1);
-            } else if left_m < -LEAST_APART * lane_width_m {
-                number = number.min(others_number - 1);
-            }
+/// Returns the middles of the lanes (m to the left of the line), each at least [`LEAST_APART`] beside
+/// its neighbours: vehicles that merge drive in the lane of others. The lane with the most positions
+/// stays where it is.
+fn in_order(fit: &LateralFit<i64>, lane_width_m: f64) -> BTreeMap<i64, f64> {
+    let mut middles_m = fit.middles_m.clone();
+    let Some((&fullest, _)) = fit.counts.iter().max_by_key(|(_, count)| **count) else { return middles_m };
+    let apart_m = |lanes: i64| LEAST_APART * lane_width_m * lanes as f64;
+    let mut latest: Option<(i64, f64)> = None;
+    for (lane, middle_m) in middles_m.range_mut(fullest..) {
+        if let Some((right, right_m)) = latest {
+            *middle_m = middle_m.max(right_m + apart_m(lane - right));
         }
-        placed.push((name, lane, number));
+        latest = Some((*lane, *middle_m));
     }
-    placed.into_iter().map(|(name, _, number)| (name, number)).collect()
+    latest = None;
+    for (lane, middle_m) in middles_m.range_mut(..=fullest).rev() {
+        if let Some((left, left_m)) = latest {
+            *middle_m = middle_m.min(left_m - apart_m(left - lane));
+        }
+        latest = Some((*lane, *middle_m));
+    }
+    middles_m
+}
+
+/// Returns the doubt about lanes whose vehicles are spread over more than a lane. If too few vehicles
+/// show how the reference line weaves, there is none.
+fn spread(positions: &LateralPositions<i64>, fit: &LateralFit<i64>, lane_width_m: f64) -> Option<String> {
+    if fit.departures.is_empty() {
+        return None;
+    }
+    let (mut spread, mut all) = (0_usize, 0_usize);
+    for deviations_m in positions.deviations_m(fit).into_values() {
+        let positions = deviations_m.len();
+        all += positions;
+        let usual_m = median(deviations_m.into_iter().map(f64::abs).collect());
+        spread += if usual_m > LARGEST_SPREAD * lane_width_m { positions } else { 0 };
+    }
+    let share = spread as f64 / all.max(1) as f64;
+    (share > WARNED_SPREAD).then(|| {
+        format!(
+            "{:.0} % of the vehicles drive in lanes whose vehicles are spread over more than a lane: the lanes that the file names \
+             are not those of the road, and lane changes are missing",
+            100.0 * share
+        )
+    })
 }
 
 /// Returns a path without what is shorter than [`SMOOTHED_M`]: twice its moving average less the
@@ -470,23 +557,11 @@ fn smoothed(points: &[Point]) -> Vec<Point> {
     once.iter().zip(&twice).map(|(once, twice)| (2.0 * once.0 - twice.0, 2.0 * once.1 - twice.1)).collect()
 }
 
-/// Returns the number of lane widths in a distance.
-fn lanes_of(d_m: f64, lane_width_m: f64) -> i64 {
-    #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and what is far away is clamped")]
-    let lanes = (d_m / lane_width_m).round() as i64;
-    lanes.clamp(-MAX_LANES_BESIDE, MAX_LANES_BESIDE)
-}
-
 /// Returns the section of the road at `s_m`.
 fn section(s_m: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates")]
     let section = (s_m / SECTION_M).floor() as i64;
     section
-}
-
-/// Returns the middle of a section (m).
-fn middle_of(section: i64) -> f64 {
-    (section as f64 + 0.5) * SECTION_M
 }
 
 /// Whether the vehicle of a path stays in its lane, the length of the path (m), and the path.

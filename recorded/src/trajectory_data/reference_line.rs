@@ -149,6 +149,21 @@ impl ReferenceLine {
         self.vertices.last().filter(|_| self.vertices.len() > 1).map(|vertex| vertex.s_m)
     }
 
+    /// Returns the point at `s_m` along the line and `left_m` to its left (m), or `None` if the line
+    /// has no extent.
+    pub(super) fn beside(&self, s_m: f64, left_m: f64) -> Option<Point> {
+        let last = self.vertices.len().checked_sub(2)?;
+        let after = self.vertices.partition_point(|vertex| vertex.s_m <= s_m);
+        let (start, end) = match &self.vertices[after.saturating_sub(1).min(last)..] {
+            [start, end, ..] => (start, end),
+            _ => return None,
+        };
+        let length_m = end.s_m - start.s_m;
+        let (ux, uy) = ((end.point.0 - start.point.0) / length_m, (end.point.1 - start.point.1) / length_m);
+        let along_m = s_m - start.s_m;
+        Some((start.point.0 + along_m * ux - left_m * uy, start.point.1 + along_m * uy + left_m * ux))
+    }
+
     /// Projects a point onto the line: along the normal that leads to it, or, if none does, onto
     /// the nearest position.
     pub(super) fn project(&self, point: Point) -> Projection {
@@ -190,6 +205,10 @@ mod tests {
             let projection = line.project((x, y));
             (projection.s_m, projection.d_m)
         };
+        assert_eq!(line.beside(14.0, -2.0), Some((14.0, -2.0)));
+        assert_eq!(line.beside(-3.0, 1.0), Some((-3.0, 1.0)));
+        assert_eq!(line.beside(25.0, -1.0), Some((25.0, -1.0)));
+        assert_eq!(ReferenceLine::through([(1.0, 1.0)].into_iter()).beside(0.0, 0.0), None);
         assert_eq!(at(4.0, 1.0), (4.0, 1.0));
         assert_eq!(at(14.0, -2.0), (14.0, -2.0));
         assert_eq!(at(-3.0, 1.0), (-3.0, 1.0));

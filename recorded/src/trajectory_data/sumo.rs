@@ -11,9 +11,9 @@
 //!
 //! - `x`, `y`: middle of the front bumper (m); `angle`: clockwise from north (°); `speed`: m/s.
 //! - `lane`: edge and index, counted from the right. An edge ends at each junction, so the road is
-//!   inferred from the traffic, and each lane of an edge becomes the lane of the road at its vehicles'
-//!   mean position; see `inferred_road`. The distance between vehicles of neighbouring lanes gives the
-//!   lane width.
+//!   inferred from the traffic; see `inferred_road`. Vehicles that go from an edge to the next one, or
+//!   through a junction, show which lanes follow one another; see `stated_lanes`. The distance between
+//!   vehicles of neighbouring lanes gives the lane width.
 //! - FCD states no sizes. A vehicle has the default size of the class that its type names; a note
 //!   says so.
 //! - Persons and containers are left out.
@@ -30,9 +30,11 @@ use super::fields::{Bounds, FieldError, number, optional_number, wrong_value};
 use super::file_layout::Layout;
 use super::header::Header;
 use super::lane_sides::{Beside, LaneSides};
+use super::markings::DEFAULT_LANE_WIDTH_M;
 use super::plain::allowed;
 use super::rows::{Lines, Separator, each_row};
 use super::source::{Clock, ReadError};
+use super::stated_lanes::StatedLane;
 use super::xml::{Node, Xml};
 
 /// The attributes of a vehicle that the reader uses, and that of a time step.
@@ -68,8 +70,8 @@ struct Entry<'a> {
 struct Reader {
     collected: Collected,
     unknown_classes: UnknownClasses,
-    /// A number for each lane, by its name.
-    named_lanes: HashMap<String, u64>,
+    /// A number for each edge, by its name.
+    edges: HashMap<String, u64>,
     /// Edge and lane index of the latest row of each vehicle.
     latest: BTreeMap<u32, (String, i64)>,
     lane_sides: LaneSides,
@@ -179,7 +181,7 @@ impl Reader {
             let before = self.latest.insert(vehicle, (edge.to_owned(), index));
             before.is_some_and(|(before_edge, before_index)| before_edge == edge && before_index != index)
         });
-        let named_lane = lane.map(|_| self.named_lane(field("lane")));
+        let named_lane = lane.map(|(edge, index)| StatedLane { edge: self.edge(edge), index: Some(index) });
         let position = Position::Plane { point, heading_rad, changes_lane, named_lane };
         Ok(CollectedRow {
             vehicle,
@@ -194,13 +196,13 @@ impl Reader {
         })
     }
 
-    /// Returns the number of the lane with this name.
-    fn named_lane(&mut self, name: &str) -> u64 {
-        if let Some(number) = self.named_lanes.get(name) {
+    /// Returns the number of the edge with this name.
+    fn edge(&mut self, name: &str) -> u64 {
+        if let Some(number) = self.edges.get(name) {
             return *number;
         }
-        let number = self.named_lanes.len() as u64;
-        self.named_lanes.insert(name.to_owned(), number);
+        let number = self.edges.len() as u64;
+        self.edges.insert(name.to_owned(), number);
         number
     }
 
@@ -227,7 +229,10 @@ impl Reader {
         let sizes = "the file states no sizes of vehicles: they have the default size of the class that their type names in SUMO";
         let mut notes = vec![sizes.to_owned()];
         if lane_width_m.is_none() {
-            notes.push("no vehicles drive beside each other: the lane width is assumed".to_owned());
+            notes.push(format!(
+                "no two vehicles drive beside each other in neighbouring lanes of one edge: a lane width of {DEFAULT_LANE_WIDTH_M} m is \
+                 assumed"
+            ));
         }
         let source = self.collected.into_source(Facts {
             layout: Layout::Sumo,

@@ -120,6 +120,10 @@ impl<R: BufRead> RowSource for TextSource<R> {
         self.format.columns.warnings()
     }
 
+    fn is_in_doubt(&self) -> bool {
+        self.format.columns.is_in_doubt()
+    }
+
     fn check_sides(&self, is_mirrored: bool) -> Result<(), ReadError> {
         self.format.columns.check_sides(is_mirrored).map_err(ReadError::of_file)
     }

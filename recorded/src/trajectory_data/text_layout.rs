@@ -31,6 +31,11 @@ pub(super) trait TextLayout {
         Vec::new()
     }
 
+    /// Returns `true` if a warning says why lane changes may be wrong or missing.
+    fn is_in_doubt(&self) -> bool {
+        false
+    }
+
     /// Checks that the columns which are not read agree with the lateral position, which is mirrored
     /// if `is_mirrored`, in the rows so far.
     ///

@@ -257,10 +257,10 @@ impl<'a> Tracks<'a> {
         }
     }
 
-    /// Returns `true` if a warning on the rows so far says that lane changes may be missing, or that
-    /// the recorded lanes are none.
+    /// Returns `true` if a warning on the file or on the rows so far says that lane changes may be
+    /// wrong or missing, or that the recorded lanes are none.
     pub fn is_in_doubt(&self) -> bool {
-        self.is_coarse() || self.doubts_lanes() || self.continuity().hides_lane_changes()
+        self.is_coarse() || self.doubts_lanes() || self.continuity().hides_lane_changes() || self.source.is_in_doubt()
     }
 
     /// Returns `true` if a warning says that the recorded lanes are none: vehicles of one lane drive

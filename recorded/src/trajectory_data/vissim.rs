@@ -36,6 +36,7 @@ use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 use super::plain::allowed;
 use super::rows::{Fields, Lines, Separator, each_row};
 use super::source::{Clock, ReadError};
+use super::stated_lanes::StatedLane;
 
 /// The start of the header.
 const HEADER: &str = "$VEHICLE:";
@@ -321,7 +322,7 @@ impl Reader {
         let beside = Beside { vehicle, road: link.to_string(), index: i64::from(index), point, heading_rad };
         self.lane_sides.add(time, beside);
         let changes_lane = before.is_some_and(|(last_link, last_index, _)| last_link == link && last_index != index);
-        let named_lane = Some((u64::from(link) << u8::BITS) | u64::from(index));
+        let named_lane = Some(StatedLane { edge: u64::from(link), index: Some(i64::from(index)) });
         Position::Plane { point, heading_rad, changes_lane, named_lane }
     }
 
