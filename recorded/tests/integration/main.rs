@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+mod derived_roads;
 mod estimated_lanes;
 mod fitted;
 mod golden;
