@@ -11,10 +11,9 @@ const CHANGING_M: f64 = 100.0;
 /// Least lateral movement of a lane change, as a share of the lane width (-).
 const LEAST_SHIFT: f64 = 0.5;
 
-/// One in this number of lane changes may contradict the file, and so may a single one, before a
-/// result is in doubt. Assumptions with plausible ranges of 5 to 20 and 0 to 3.
+/// One in this number of lane changes may contradict the file before a result is in doubt. An
+/// assumption with a plausible range of 5 to 20.
 const ONE_WRONG_IN: u64 = 10;
-const FEW_WRONG: u64 = 1;
 
 /// A row that names its lane.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +73,7 @@ impl LaneComparison {
     /// Returns why the lanes on the derived road are in doubt.
     pub(super) fn doubts(&self) -> Vec<String> {
         let Self { stated, derived, unstated, unfollowed, .. } = *self;
-        let is_many = |wrong: u64, all: u64| wrong > FEW_WRONG && ONE_WRONG_IN * wrong > all;
+        let is_many = |wrong: u64, all: u64| ONE_WRONG_IN * wrong > all;
         let mut doubts = Vec::new();
         if is_many(unstated, derived) {
             doubts.push(format!(

@@ -11,7 +11,7 @@ use closecall_recorded::trajectory_data::{
 };
 use closecall_traffic::{Lane, Side, Time, maths};
 
-use crate::support::data_folder;
+use crate::support::{data_folder, read_text};
 
 #[test]
 fn the_highd_layout_yields_the_same_data_as_the_plain_layout() {
@@ -297,8 +297,8 @@ fn a_file_of_another_layout_than_required_is_rejected() {
 /// Writes an exiD data set of a road that bends with a radius of 2 km and is driven in both
 /// directions. The first direction has two lanes. Vehicle 1 keeps the right lane, vehicle 2 changes
 /// from the right to the left lane, vehicle 3 keeps the left lane, and vehicle 4 drives in the
-/// opposite direction.
-fn write_bent_both_ways(folder: &Path) {
+/// opposite direction. Each lane is a lanelet, or, unless `names_lanes`, all lanes are one lanelet.
+fn write_bent_both_ways(folder: &Path, names_lanes: bool) {
     const RADIUS_M: f64 = 2_000.0;
     const LANE_M: f64 = 3.75;
     let meta = "recordingId,locationId,frameRate\n3,0,25\n";
@@ -331,8 +331,15 @@ fn write_bent_both_ways(folder: &Path) {
             let heading = angle.to_degrees() + if is_back { 180.0 } else { 0.0 };
             let speed_mps = if is_back { 29.0 } else { 24.0 + f64::from(vehicle) };
             let changes = u8::from(vehicle == 2 && frame == 125);
+            let lanelet = match vehicle {
+                _ if !names_lanes => 12,
+                1 => 12,
+                2 if frame < 125 => 12,
+                2 | 3 => 13,
+                _ => 14,
+            };
             rows += &format!(
-                "3,{vehicle},{frame},{x_m:.4},{y_m:.4},{heading:.4},1.9,4.7,0,0,{speed_mps},0,0.5,0,{LANE_M};3.7,12;13,{changes}\n"
+                "3,{vehicle},{frame},{x_m:.4},{y_m:.4},{heading:.4},1.9,4.7,0,0,{speed_mps},0,0.5,0,{LANE_M};3.7,{lanelet};99,{changes}\n"
             );
         }
     }
@@ -342,8 +349,9 @@ fn write_bent_both_ways(folder: &Path) {
 #[test]
 fn the_road_of_exid_data_is_inferred_from_its_traffic() {
     let folder = tempfile::tempdir().unwrap();
-    write_bent_both_ways(folder.path());
+    write_bent_both_ways(folder.path(), true);
     let data = read(folder.path()).unwrap();
+    assert!(!data.is_in_doubt, "{:?}", data.warnings());
     assert_eq!((data.layout, data.period), (Layout::Exid, Time::from_ms(40)));
     let [keeps, changes, left, back] = data.trajectories.as_slice() else { panic!() };
     let lanes = |track: &closecall_traffic::Trajectory| (track.points[0].lane.0, track.points[249].lane.0);
@@ -357,4 +365,29 @@ fn the_road_of_exid_data_is_inferred_from_its_traffic() {
     let changes = detect(&smooth(&data));
     assert_eq!(changes.iter().map(|change| change.track_id).collect::<Vec<_>>(), [2]);
     assert!((changes[0].crossing_s - 5.0).abs() < 0.2, "{}", changes[0].crossing_s);
+}
+
+#[test]
+fn a_lane_change_of_exid_without_another_lanelet_is_in_doubt() {
+    let folder = tempfile::tempdir().unwrap();
+    write_bent_both_ways(folder.path(), false);
+    let data = read(folder.path()).unwrap();
+    assert!(detect(&smooth(&data)).is_empty() && data.is_in_doubt);
+    let warnings = data.warnings();
+    assert!(
+        warnings.iter().any(|warning| warning.starts_with("1 of 1 lane changes that the file states")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn positions_far_from_the_origin_of_a_road_are_read() {
+    let mut text =
+        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    for frame in 0..40 {
+        let time_s = 0.1 * f64::from(frame);
+        text += &format!("1,{frame},{time_s:.1},{:.2},1.75,1,30,0,4.5,1.8,car\n", 5_300_000.0 + 30.0 * time_s);
+    }
+    let data = read_text(text.as_bytes()).unwrap();
+    assert!((data.trajectories[0].points[39].s_m - 5_300_117.0).abs() < 0.01);
 }
