@@ -53,8 +53,7 @@ impl LaneComparison {
     /// Ends the rows of a vehicle.
     pub(super) fn end_vehicle(&mut self, lane_width_m: f64) {
         let rows = std::mem::take(&mut self.rows);
-        let mut unstated = 0;
-        let (mut stated, mut derived) = (0, 0);
+        let (mut stated, mut derived, mut unstated) = (0_u64, 0_u64, 0_u64);
         for (k, pair) in rows.windows(2).enumerate() {
             let (before, row) = (&pair[0], &pair[1]);
             stated += u64::from(row.changes_lane && !before.changes_lane);

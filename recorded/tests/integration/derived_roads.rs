@@ -116,8 +116,8 @@ fn found(data: &TrajectoryData) -> Vec<(u64, Side, f64)> {
 fn assert_has(data: &TrajectoryData, reference: &[(u64, Side, f64)], case: &str) {
     let found = found(data);
     let is_same = |a: &(u64, Side, f64), b: &(u64, Side, f64)| a.0 == b.0 && a.1 == b.1 && (a.2 - b.2).abs() <= 0.5;
-    let missing = reference.iter().filter(|listed| !found.iter().any(|other| is_same(listed, other))).count();
-    let invented = found.iter().filter(|other| !reference.iter().any(|listed| is_same(listed, other))).count();
+    let missing = reference.iter().filter(|&listed| !found.iter().any(|other| is_same(listed, other))).count();
+    let invented = found.iter().filter(|&other| !reference.iter().any(|listed| is_same(listed, other))).count();
     assert!(missing <= 1 && invented <= 1, "{case}: {missing} of {} missing, {invented} invented", reference.len());
     assert!(!data.is_in_doubt, "{case}: {:?}", data.warnings());
 }
