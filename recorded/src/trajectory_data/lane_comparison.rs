@@ -15,6 +15,10 @@ const LEAST_SHIFT: f64 = 0.5;
 /// assumption with a plausible range of 5 to 20.
 const ONE_WRONG_IN: u64 = 10;
 
+/// Number of lane changes without a movement sideways that may have another cause: a track may end
+/// soon after its vehicle changes lanes where one name ends and the next begins.
+const FEW_UNSTATED: u64 = 1;
+
 /// A row that names its lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ComparedRow {
@@ -74,7 +78,7 @@ impl LaneComparison {
         let Self { stated, derived, unstated, unfollowed, .. } = *self;
         let is_many = |wrong: u64, all: u64| ONE_WRONG_IN * wrong > all;
         let mut doubts = Vec::new();
-        if is_many(unstated, derived) {
+        if unstated > FEW_UNSTATED && is_many(unstated, derived) {
             doubts.push(format!(
                 "{unstated} of {derived} lane changes on the road that was derived from the traffic have no change of the lane that \
                  the file names: its lanes were not followed"

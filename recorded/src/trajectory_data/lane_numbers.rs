@@ -1,10 +1,11 @@
 //! The numbers of strands across the road: by how many lanes each lies to the left of the reference
 //! line.
 //!
-//! Within a chain, the order of the strands is known. Chains get their numbers one after the other,
-//! the nearest to the reference line first. The position relative to a strand that already has a
-//! number counts, where both are recorded beside each other: errors of the line are the same for
-//! both there. Strands that lie apart, or between which vehicles change lanes, get different numbers.
+//! Within a chain, the order of the strands is known. Chains get their numbers one after the other:
+//! strands with few rows last, and else the nearest to the reference line first. The position relative
+//! to a strand that already has a number counts, where both are recorded beside each other: errors of
+//! the line are the same for both there. Strands that lie apart, or between which vehicles change
+//! lanes, get different numbers.
 
 use std::collections::BTreeMap;
 
@@ -18,6 +19,11 @@ const MAX_LANES_BESIDE: i64 = 20;
 /// Least distance between two strands beside each other that are different lanes, as a share of the
 /// lane width (-): vehicles that merge keep to the near side of a lane.
 pub(super) const LEAST_APART: f64 = 0.4;
+
+/// Share of the rows of the fullest strand below which a strand has few rows (-). It may be a ramp,
+/// which lies where its neighbour does, or a piece that could not be joined. An assumption with a
+/// plausible range of 0.05 to 0.3.
+const FEW_ROWS: f64 = 0.2;
 
 /// The lateral positions in a strand.
 #[derive(Clone, Debug, Default)]
@@ -53,6 +59,7 @@ pub(super) struct LaneNumbers {
 /// Where a strand lies.
 struct Measured {
     strand: Strand,
+    rows: u64,
     mean_m: f64,
     /// Median position (m), by section of the road.
     medians_m: BTreeMap<i64, f64>,
@@ -73,10 +80,12 @@ impl LaneNumbers {
     pub(super) fn of_strands(rows: BTreeMap<Strand, StrandRows>, strands: &Strands, lane_width_m: f64) -> Self {
         let measured = rows.into_iter().map(|(strand, StrandRows { rows, sum_m, sections_m })| {
             let medians_m = sections_m.into_iter().map(|(section, positions_m)| (section, median(positions_m)));
-            Measured { strand, mean_m: sum_m / rows.max(1) as f64, medians_m: medians_m.collect() }
+            Measured { strand, rows, mean_m: sum_m / rows.max(1) as f64, medians_m: medians_m.collect() }
         });
         let mut measured: Vec<Measured> = measured.collect();
-        measured.sort_by(|a, b| a.mean_m.abs().total_cmp(&b.mean_m.abs()));
+        let most = measured.iter().map(|lane| lane.rows).max().unwrap_or_default() as f64;
+        let has_few = |lane: &Measured| (lane.rows as f64) < FEW_ROWS * most;
+        measured.sort_by(|a, b| has_few(a).cmp(&has_few(b)).then(a.mean_m.abs().total_cmp(&b.mean_m.abs())));
         let is_mirrored = falls_with_index(&measured);
         let sense = if is_mirrored { -1 } else { 1 };
         let mut first_numbers: BTreeMap<u64, i64> = BTreeMap::new();
@@ -100,16 +109,21 @@ fn beside_numbered(lane: &Measured, numbered: &[(&Measured, i64)], strands: &Str
     beside.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
     let Some((nearest_m, _, nearest)) = beside.first() else { return lanes_of(lane.mean_m, lane_width_m) };
     let mut number = nearest + lanes_of(*nearest_m, lane_width_m);
-    for (left_m, other, others_number) in &beside {
-        let is_other_lane = left_m.abs() > LEAST_APART * lane_width_m
-            || (strands.are_neighbours(lane.strand, *other) && number == *others_number);
-        if is_other_lane && *left_m > 0.0 {
+    for (left_m, _, others_number) in &beside {
+        if *left_m > LEAST_APART * lane_width_m {
             number = number.max(others_number + 1);
-        } else if is_other_lane {
+        } else if *left_m < -LEAST_APART * lane_width_m {
             number = number.min(others_number - 1);
         }
     }
-    number
+    // A ramp may lie where the lane beside it does. It then takes the free side of that lane.
+    let is_neighbour = |(_, other, others_number): &&(f64, Strand, i64)| {
+        *others_number == number && strands.are_neighbours(lane.strand, *other)
+    };
+    let Some((left_m, ..)) = beside.iter().find(is_neighbour) else { return number };
+    let sides = if *left_m > 0.0 { [number + 1, number - 1] } else { [number - 1, number + 1] };
+    let is_free = |side: &i64| beside.iter().all(|(_, _, others_number)| others_number != side);
+    sides.into_iter().find(is_free).unwrap_or(sides[0])
 }
 
 /// Returns `true` if most strands with a higher number in their chain lie to the right of those with a
@@ -140,7 +154,30 @@ fn clamped(lanes: i64) -> i64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::stated_lanes::{LaneObserver, LaneRow, StatedLane};
     use super::*;
+
+    #[test]
+    fn a_ramp_that_lies_where_its_neighbour_does_takes_the_free_side() {
+        // Vehicles change from lanelet 1 to lanelet 3, the ramp, which lies 0.1 m to its left.
+        let mut observer = LaneObserver::default();
+        for (vehicle, edge, changes_lane) in [(1, 1, false), (1, 3, true), (2, 2, false)] {
+            let lane = StatedLane { edge, index: None };
+            observer.add(LaneRow { vehicle, lane, changes_lane, s_m: 0.0 });
+        }
+        let strands = observer.strands();
+        let mut rows: BTreeMap<Strand, StrandRows> = BTreeMap::new();
+        for (edge, d_m, sections) in [(1, 0.0, 20), (2, 3.5, 20), (3, 0.1, 3)] {
+            let strand = strands.of_lane(StatedLane { edge, index: None }).unwrap();
+            let lane = rows.entry(strand).or_default();
+            for section in 0..sections {
+                lane.add(d_m);
+                lane.add_in_section(section, d_m);
+            }
+        }
+        let LaneNumbers { numbers, .. } = LaneNumbers::of_strands(rows, &strands, 3.5);
+        assert_eq!(numbers.into_values().collect::<Vec<_>>(), [0, 1, -1]);
+    }
 
     /// Numbers strands, given by chain, number, lateral position (m), and first and last section.
     fn numbers(lanes: &[(u64, i64, f64, i64, i64)]) -> (Vec<i64>, bool) {
