@@ -53,9 +53,6 @@ const DIMENSION_M: Bounds = Bounds::above(0.0, 60.0);
 /// Distance by which the upper carriageway is shifted to the right of the lower one (m).
 const SEPARATION_M: f64 = 1_000.0;
 
-/// Positions across the road, with the same bounds as its markings.
-const Y_M: Bounds = Bounds::closed(-1e4, 1e4);
-
 /// Share of the rows of a driving direction above which vehicles do not drive in it (-): single rows
 /// may be damaged. An assumption with a plausible range of 0.2 to 0.9.
 const AGAINST_SHARE: f64 = 0.5;
