@@ -157,9 +157,7 @@ impl Collected {
         order.sort_by_key(|&index| (rows[index].vehicle, rows[index].time, rows[index].line));
         let period = period(&rows, &order);
         let road = infer_road(&rows, &order, facts.lane_width_m).map_err(|error| match error.problem {
-            TrajectoryFileProblem::NoRoad { .. } => {
-                against_headings(&rows, &order).map_or(error, ReadError::of_file)
-            }
+            TrajectoryFileProblem::NoRoad { .. } => against_headings(&rows, &order).map_or(error, ReadError::of_file),
             _ => error,
         })?;
         notes.extend(road.iter().flat_map(InferredRoad::warnings));

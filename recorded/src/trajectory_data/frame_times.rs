@@ -223,8 +223,7 @@ impl Unevenness {
             Some(ReadError { line, column, problem })
                 if errors >= LEAST_UNEVEN && errors as f64 > IRREGULAR_SHARE * steps as f64 =>
             {
-                let problem =
-                    TrajectoryFileProblem::IrregularClock { first: Box::new(problem), uneven: errors, steps };
+                let problem = TrajectoryFileProblem::IrregularClock { first: Box::new(problem), uneven: errors, steps };
                 Err(ReadError { line, column, problem })
             }
             _ => Ok(ticks),
@@ -239,8 +238,7 @@ mod tests {
 
     use crate::trajectory_data::{ReadOptions, TrajectoryData, TrajectoryFileProblem, open_from};
 
-    const HEADER: &str =
-        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n";
+    const HEADER: &str = "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n";
 
     /// Reads three vehicles over 200 frames, whose times `written` gives as text.
     fn read(written: impl Fn(i32) -> String) -> Result<TrajectoryData, TrajectoryFileProblem> {
@@ -268,8 +266,9 @@ mod tests {
             let off_s = (data.period.s() - 1.0 / rate_hz).abs();
             assert!(off_s < 1e-5 && data.trajectories.len() == 3, "{rate_hz} Hz, {digits} digits: {off_s} s");
             let points = &data.trajectories[0].points;
-            let uneven = points.windows(2).filter(|pair| (pair[1].time - pair[0].time - data.period).ns().abs() > 1);
-            assert_eq!(uneven.count(), 0, "{rate_hz} Hz, {digits} digits");
+            let off_ns = points.windows(2).map(|pair| (pair[1].time - pair[0].time - data.period).ns().abs()).max();
+            // Steps that differ by less than 2 % stay as they are written.
+            assert!(off_ns.unwrap() * 50 <= data.period.ns(), "{rate_hz} Hz, {digits} digits: {off_ns:?} ns");
         }
         for jitter_s in [0.001, 0.003, 0.005] {
             let data = read(|frame| format!("{:.6}", 5.0 + f64::from(frame) / 30.0 + jitter_s * noise(frame))).unwrap();

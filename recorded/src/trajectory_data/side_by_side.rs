@@ -192,7 +192,9 @@ impl SideBySide {
         let (doubled, vehicles) = (self.doubled.len(), self.vehicles.len());
         let is_common = doubled >= LEAST_VEHICLES && doubled as f64 > BESIDE_SHARE * vehicles as f64;
         is_common.then(|| {
-            format!("{doubled} of {vehicles} vehicles drive beside another one that is recorded in the same lane: {end}")
+            format!(
+                "{doubled} of {vehicles} vehicles drive beside another one that is recorded in the same lane: {end}"
+            )
         })
     }
 
@@ -258,9 +260,8 @@ mod tests {
 
     #[test]
     fn half_of_a_lane_width_is_refused_and_narrow_lanes_are_not() {
-        let lanes = |width: f64| -> Vec<(u8, f64)> {
-            (1..=5).map(|lane| (lane, width * (f64::from(lane) - 0.5))).collect()
-        };
+        let lanes =
+            |width: f64| -> Vec<(u8, f64)> { (1..=5).map(|lane| (lane, width * (f64::from(lane) - 0.5))).collect() };
         for width_m in [2.5, 3.5, 5.5] {
             assert!(read(&lanes(width_m)).is_ok(), "{width_m} m");
         }

@@ -254,8 +254,9 @@ impl Reader {
         integer(text(vehicle), "NO", allowed::IDS)?;
         let class = self.class(vehicle_type.map_or("", text));
         let typical = class.typical_dimensions();
-        let Units { length: length_unit, plane: plane_unit, speed: speed_unit, acceleration: acceleration_unit, .. } =
-            self.units;
+        let Units {
+            length: length_unit, plane: plane_unit, speed: speed_unit, acceleration: acceleration_unit, ..
+        } = self.units;
         let stated_length = length.map(|index| real(index, "LENGTH", length_unit, allowed::LENGTH_M)).transpose()?;
         let width_m = width.map(|index| real(index, "WIDTH", length_unit, allowed::WIDTH_M)).transpose()?;
         let (position, length_m) = match place {
@@ -305,13 +306,7 @@ impl Reader {
     }
 
     /// Adds the lane that a row names to a position in a plane. Texts that name no lane are left out.
-    fn in_named_lane(
-        &mut self,
-        position: Position,
-        lane: Option<(&str, &str)>,
-        vehicle: &str,
-        time: Time,
-    ) -> Position {
+    fn in_named_lane(&mut self, position: Position, lane: Option<(&str, &str)>, vehicle: &str, time: Time) -> Position {
         let lane = lane.and_then(|(link, index)| Some((link.parse::<u32>().ok()?, index.parse::<u8>().ok()?)));
         let (Position::Plane { point, heading_rad, .. }, Some((link, index))) = (position, lane) else {
             return position;

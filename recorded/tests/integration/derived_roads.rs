@@ -8,7 +8,7 @@ use std::path::Path;
 
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::detect;
-use closecall_recorded::trajectory_data::{TrajectoryData, read};
+use closecall_recorded::trajectory_data::{TrajectoryData, TrajectoryFileProblem, read};
 use closecall_traffic::{Side, Time, Trajectory, maths};
 
 use crate::support::{data_folder, read_text};
@@ -165,12 +165,10 @@ fn vehicles_beside_the_middles_of_their_lanes_change_no_lane() {
 }
 
 #[test]
-fn lanes_that_sumo_counts_from_the_left_are_in_doubt() {
-    let data = read_text(sumo(&off_centre(), Course::Mirrored, counted_from_right(Edges::One)).as_bytes()).unwrap();
-    assert!(data.is_in_doubt);
-    let warnings = data.warnings();
-    assert!(warnings.iter().any(|warning| warning.contains("lie further to the right")), "{warnings:?}");
-    assert!(!warnings.iter().any(|warning| warning.contains("beside each other")), "{warnings:?}");
+fn lanes_that_sumo_counts_from_the_left_are_refused() {
+    let read = read_text(sumo(&off_centre(), Course::Mirrored, counted_from_right(Edges::One)).as_bytes());
+    let problem = read.unwrap_err().problem;
+    assert!(matches!(problem, TrajectoryFileProblem::IndexAgainstPosition { percent: 90.0.., .. }), "{problem}");
 }
 
 #[test]

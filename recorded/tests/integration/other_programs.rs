@@ -8,8 +8,8 @@ use std::sync::Arc;
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::detect;
 use closecall_recorded::trajectory_data::{
-    AxisOptions, BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, TrajectoryFileProblem, open_from,
-    read, read_from, read_with,
+    AxisOptions, BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError,
+    TrajectoryFileProblem, open_from, read, read_from, read_with,
 };
 use closecall_traffic::{Side, Time, VehicleClass, maths};
 use parquet::basic::{Compression, GzipLevel, ZstdLevel};
@@ -284,7 +284,11 @@ fn traffic_without_a_road_is_refused_with_the_reason() {
 #[test]
 fn headings_in_other_axes_than_the_positions_are_refused_by_that_reason() {
     let text = sumo_xml(false).replace("angle=\"90.00\"", "angle=\"0.00\"");
-    assert_mentions(&read_text(text.as_bytes()).unwrap_err(), &["than its heading states", "different axes"], "headings");
+    assert_mentions(
+        &read_text(text.as_bytes()).unwrap_err(),
+        &["than its heading states", "different axes"],
+        "headings",
+    );
 }
 
 #[test]
@@ -424,7 +428,8 @@ fn coordinates_of_vissim_in_feet_are_read_as_their_comments_state() {
     const FOOT_M: f64 = 0.3048;
     let in_feet = vissim("SPEED;COORDFRONT;COORDREAR", |drive, time_s| {
         let (front_m, y_m, _) = drive.at(time_s, false);
-        let [front, rear, y] = [front_m, front_m - 5.0, y_m / SUMO_LANE_M * VISSIM_LANE_M].map(|value_m| value_m / FOOT_M);
+        let [front, rear, y] =
+            [front_m, front_m - 5.0, y_m / SUMO_LANE_M * VISSIM_LANE_M].map(|value_m| value_m / FOOT_M);
         format!("{:.3};{front:.3} {y:.3} 0.0;{rear:.3} {y:.3} 0.0", 3.6 * drive.speed_mps)
     });
     let units = "* POS: Position [m]\n* COORDFRONT: Front [ft]\n* COORDREAR: Rear [ft]\n";

@@ -11,6 +11,8 @@ use super::probe::Probe;
 use super::schema::{Key, Kind, Step, Table, Way, tables};
 use super::text::Described;
 
+/// Number of places of a table above which its heading leaves out the last ones.
+const MOST_TITLES: usize = 3;
 /// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear
 /// object-level sensor. A sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
@@ -76,7 +78,11 @@ pub(crate) fn scenario_page() -> Result<String, Box<dyn Error>> {
 }
 
 fn section(page: &mut String, table: &Table, all: &[Table], probe: &Probe) -> Result<(), Box<dyn Error>> {
-    let titles: Vec<String> = table.ways.iter().map(|way| format!("`{}`", title(way))).collect();
+    let mut titles: Vec<String> = table.ways.iter().map(|way| format!("`{}`", title(way))).collect();
+    if titles.len() > MOST_TITLES {
+        titles.truncate(MOST_TITLES - 1);
+        titles.push("…".to_owned());
+    }
     let way = &table.ways[0];
     writeln!(page, "\n<a id=\"{}\"></a>\n\n### {}\n", anchor(way), titles.join(", "))?;
     let Described { meaning, .. } = Described::new("", &table.description, false);
@@ -174,6 +180,7 @@ fn name(kind: &Kind) -> String {
 fn plural(kind: &Kind) -> String {
     match kind {
         Kind::List(element) => format!("lists of {}", plural(element)),
+        Kind::Tuple(element, length) => format!("lists of {length} {}", plural(element)),
         kind => format!("{}s", name(kind)),
     }
 }

@@ -97,16 +97,13 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     /// Adds the table that `schema` defines, and its inner tables.
     fn visit(&mut self, schema: &'a Value, definition: String, way: Way) {
-        if let Some(table) =
-            self.tables.iter_mut().find(|table| !definition.is_empty() && table.definition == definition)
-        {
-            table.ways.push(way);
-            return;
-        }
         let (mut properties, is_choice) = properties(schema);
         properties.sort_by_key(|property| (self.order)(property.name));
+        let is_same = |table: &&mut Table| !definition.is_empty() && table.definition == definition;
+        if let Some(table) = self.tables.iter_mut().find(is_same) {
+            table.ways.push(way.clone());
         // A choice of one kind is no choice: its content gets its own section.
-        if !is_choice || properties.len() > 1 {
+        } else if !is_choice || properties.len() > 1 {
             let keys = properties.iter().map(|property| self.key(property)).collect();
             let (ways, description) = (vec![way.clone()], description(schema));
             self.tables.push(Table { definition, ways, description, is_choice, keys });
