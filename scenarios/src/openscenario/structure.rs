@@ -254,7 +254,7 @@ mod tests {
         let story = |story: &str| with_declarations(declaration, story);
         let declared = |declarations: &str| with_declarations(declarations, "");
         for (text, word) in [
-            (declared("<ParameterDeclaration nmae=\"a\"/>"), "`nmae` is no attribute of it, which can have name"),
+            (declared("<ParameterDeclaration title=\"a\"/>"), "`title` is no attribute of it, which can have name"),
             (declared("<ParameterDeclaration name=\"a\" value=\"1\"/>"), "it needs `parameterType`"),
             (declared(&declaration.replace("double", "real")), "`parameterType` is `real`; one of boolean"),
             (declared(&declaration.replace('5', "five")), "the double `a`: `value` is `five`"),
