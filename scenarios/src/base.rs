@@ -6,6 +6,8 @@
 //! a parameter that no value uses. The result is one text, on which all later steps work, and a
 //! campaign's folder keeps the whole scenario.
 
+use std::path::Path;
+
 use toml_edit::{DocumentMut, Item, TableLike};
 
 use super::file::used_parameters;
@@ -63,8 +65,9 @@ fn remove_unused(whole: &mut DocumentMut, file: &DocumentMut) {
 }
 
 /// Returns the error of the whole text as an error of the text that names the base. Its line is the
-/// line with the same words there, or the line of the key `base` if the words are the base's.
-pub(super) fn located(error: ScenarioError, whole: &str, text: &str) -> ScenarioError {
+/// line with the same words there, or the line of the key `base` if the words are the base's. An
+/// error of another file, such as a pattern of a LiDAR, stays as it is.
+pub(super) fn located(error: ScenarioError, own: &Path, whole: &str, text: &str) -> ScenarioError {
     let line_of = |line: usize| {
         let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
         let is_same = |line: &str| line.trim() == words;
@@ -72,8 +75,10 @@ pub(super) fn located(error: ScenarioError, whole: &str, text: &str) -> Scenario
         own_line.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
     };
     match error {
-        ScenarioError::Syntax { path, line, message } => ScenarioError::Syntax { path, line: line_of(line), message },
-        ScenarioError::Value { path, line, source, at } => {
+        ScenarioError::Syntax { path, line, message } if path == own => {
+            ScenarioError::Syntax { path, line: line_of(line), message }
+        }
+        ScenarioError::Value { path, line, source, at } if path == own => {
             ScenarioError::Value { path, line: line.map(line_of), source, at }
         }
         other => other,

@@ -192,7 +192,7 @@ impl ScenarioFile {
         match base::expand(text) {
             Ok(None) => Self::parse_whole(path, text, settings),
             Ok(Some(whole)) => {
-                Self::parse_whole(path, &whole, settings).map_err(|error| base::located(error, &whole, text))
+                Self::parse_whole(path, &whole, settings).map_err(|error| base::located(error, path, &whole, text))
             }
             Err(message) => Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message }),
         }

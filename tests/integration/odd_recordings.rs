@@ -152,7 +152,7 @@ fn times_that_jitter_are_read_and_mixed_steps_are_refused_without_advice_to_drop
             vec![("time_s", (time_s * 1_000.0).round() / 1_000.0)]
         })
     };
-    let jitter = moved("jitter.csv", &|frame| 0.003 * (12.9898 * frame).sin());
+    let jitter = moved("jitter.csv", &|frame| 0.003 * closecall_traffic::maths::sin(12.9898 * frame));
     assert_eq!(lane_changes(&jitter, &[]).0.len(), whole);
     // Steps of 65 and of 15 ms take turns.
     let mixed = moved("mixed.csv", &|frame| 0.05 * (frame / 2.0).fract());

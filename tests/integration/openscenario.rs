@@ -208,7 +208,9 @@ fn a_trajectory_becomes_speeds_and_lane_changes() {
     assert!((change["duration-s"].as_float().unwrap() - 6.315).abs() < 0.01, "{text}");
     let never = TIMING.replace("relative", "never");
     let absolute = TIMING.replace("relative", "absolute");
-    let wrong: [(&str, &[(f64, i32, f64)], &str); 7] = [
+    // Time, lane and position along the road.
+    type Vertices<'a> = &'a [(f64, i32, f64)];
+    let wrong: [(&str, Vertices<'_>, &str); 7] = [
         (TIMING, &[(0.0, -2, 100.0), (1.0, -2, 120.0)], "its trajectory begins at s = 100.00 m"),
         (TIMING, &[(0.0, -2, 170.0), (1.0, -2, 160.0)], "-10.00 m/s"),
         (TIMING, &[(0.0, -2, 170.0), (0.0, -2, 190.0)], "`time` must grow"),

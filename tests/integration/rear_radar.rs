@@ -25,7 +25,7 @@ struct NewTracks {
 }
 
 /// Returns the rear track of the vehicle, whose position relative to the ego is known.
-fn track_at<'a>(tracks: &'a [Track], [x_m, y_m]: [f64; 2]) -> Option<&'a Track> {
+fn track_at(tracks: &[Track], [x_m, y_m]: [f64; 2]) -> Option<&Track> {
     let is_near = |track: &&Track| (track.x_m() - x_m).abs() < 4.0 && (track.y_m() - y_m).abs() < 1.5;
     tracks.iter().filter(|track| track.source == Source::Rear).find(is_near)
 }

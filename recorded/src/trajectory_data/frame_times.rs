@@ -255,7 +255,7 @@ mod tests {
 
     /// A number between -1 and 1 that looks random.
     fn noise(frame: i32) -> f64 {
-        (f64::from(frame) * 12.9898).sin()
+        closecall_traffic::maths::sin(f64::from(frame) * 12.9898)
     }
 
     #[test]

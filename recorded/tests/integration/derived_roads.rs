@@ -197,8 +197,11 @@ fn rows(tracks: &[Trajectory]) -> Vec<Seen> {
     tracks.iter().flat_map(of_track).collect()
 }
 
+/// Track, direction and time of a lane change (s).
+type Change = (u64, Side, f64);
+
 /// Reads one recording of US-101, if it is available: its rows, and its lane changes.
-fn us_101(name: &str) -> Option<(TrajectoryData, Vec<(u64, Side, f64)>)> {
+fn us_101(name: &str) -> Option<(TrajectoryData, Vec<Change>)> {
     let data = read(&data_folder()?.join("ngsim_us101/trajectories").join(format!("{name}.csv"))).unwrap();
     let changes = detect(&smooth(&data));
     let listed = changes.iter().map(|change| (change.track_id, change.direction, change.crossing_s)).collect();

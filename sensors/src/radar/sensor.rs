@@ -293,7 +293,8 @@ mod tests {
         let [measured, _] = detections(&mut radars, &road, &[car(38.0)], 10_000);
         assert_eq!(measured.len(), 10_000, "each scan detects the car");
         let model = radars.model;
-        let columns: [(fn(&RadarDetection) -> f64, f64, f64); 3] = [
+        type Value = fn(&RadarDetection) -> f64;
+        let columns: [(Value, f64, f64); 3] = [
             (|detection| detection.range_m, truth.range_m, model.range_sd_m),
             (|detection| detection.azimuth_rad, truth.azimuth_rad, model.azimuth_sd_rad),
             (|detection| detection.radial_mps, truth.radial_mps, model.speed_sd_mps),
