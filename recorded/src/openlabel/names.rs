@@ -1,4 +1,4 @@
-//! The names in the files: those of OpenLABEL and its ontology, and Closecall's own.
+//! The names in the files. OpenLABEL and its ontology define some, and Closecall the others.
 
 use closecall_traffic::{Side, VehicleClass};
 

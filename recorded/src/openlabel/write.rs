@@ -15,7 +15,7 @@ use crate::criticality::MetricResult;
 use crate::lane_change::LaneChange;
 use crate::trajectory_data::{LaneMarkings, WriteError};
 
-/// Number of ASAM's ontology among those of a file.
+/// Number of ASAM's ontology in a file.
 const ONTOLOGY_UID: &str = "0";
 
 /// What the file says of itself.
