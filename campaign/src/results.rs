@@ -22,6 +22,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use closecall_traffic::atomic::{WriteError, is_temporary};
 use serde_json::Value;
@@ -38,6 +39,8 @@ pub const PREVIOUS: &str = "closecall-results.previous";
 
 /// Number of attempts to take a folder while other campaigns begin and end in it.
 const ATTEMPTS: usize = 5;
+/// The time from one attempt to the next.
+const PAUSE: Duration = Duration::from_millis(20);
 /// Largest number of files that a message names.
 const NAMED_FILES: usize = 3;
 
@@ -101,22 +104,43 @@ struct Kept {
 /// [`FolderError::Busy`] if another campaign runs there, other [`FolderError`]s if a folder cannot
 /// be read or written.
 pub fn take(folder: &Path, manifest: &Manifest, announce: impl Fn(Unfinished<'_>)) -> Result<Taken, FolderError> {
-    let [path, previous] = [RESULTS, PREVIOUS].map(|name| folder.join(name));
     let mut moved = None;
-    let mut taken = Err(FolderError::Busy { path: path.clone(), holder: "several start at the same time".to_owned() });
-    for _ in 0..ATTEMPTS {
-        if let Place::Results(_) = inspect(&path, true)? {
-            // An obstacle, even a lock, is found before anything is written.
-            inspect(&previous, true)?;
-            moved = set_aside(&path, &previous, &announce)?.or(moved);
-        }
-        taken = Folder::lock(&path, manifest, false);
-        // Another campaign has begun and ended here since the path was free.
-        if !matches!(taken, Err(FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. })) {
-            break;
+    for _ in 1..ATTEMPTS {
+        match attempt(folder, manifest, &announce, &mut moved) {
+            Err(error) if may_pass(&error) => std::thread::sleep(PAUSE),
+            locked => return Ok(Taken { locked: locked?, moved }),
         }
     }
-    Ok(Taken { locked: taken?, moved })
+    let locked = attempt(folder, manifest, &announce, &mut moved)?;
+    Ok(Taken { locked, moved })
+}
+
+/// Tries once to do what [`take`] does. Sets `moved` if results have become the previous ones, also
+/// if the attempt fails after that.
+fn attempt(
+    folder: &Path,
+    manifest: &Manifest,
+    announce: impl Fn(Unfinished<'_>),
+    moved: &mut Option<Moved>,
+) -> Result<LockedFolder, FolderError> {
+    let [path, previous] = [RESULTS, PREVIOUS].map(|name| folder.join(name));
+    if let Place::Results(_) = inspect(&path, true)? {
+        // An obstacle, even a lock, is found before anything is written.
+        inspect(&previous, true)?;
+        *moved = set_aside(&path, &previous, announce)?.or(moved.take());
+    }
+    Folder::lock(&path, manifest, false)
+}
+
+/// Returns true for an error that may come from another campaign alone: it has begun, ended, or
+/// moved or removed results, while this one looked at them without a lock. No lock is possible
+/// there, because nothing may be written into a folder before it is known to be a campaign's.
+fn may_pass(error: &FolderError) -> bool {
+    match error {
+        FolderError::Write(WriteError { source, .. }) => source.kind() == ErrorKind::NotFound,
+        FolderError::Busy { .. } => false,
+        _ => true,
+    }
 }
 
 /// Locks the folder of the results in `folder`, the working folder, to resume the campaign of
