@@ -85,8 +85,8 @@ pub struct SensorsConfig {
     /// the first scan that is due. Default: 0, none.
     #[serde(skip_serializing_if = "is_none")]
     pub perception_image_hz: Num,
-    /// Distance of the columns and rows of 1280 × 800 pixels that such an image has (px): 1 to 8.
-    /// Default: 2, 640 × 400 pixels.
+    /// Distance of the columns and rows of the camera's image that such an image has (px): 1 to 8.
+    /// Default: 2, 640 × 400 of 1280 × 800 pixels.
     #[serde(skip_serializing_if = "is_default_step")]
     pub perception_image_step: u8,
     /// The radar that looks ahead.

@@ -151,11 +151,12 @@ fn is_hidden(index: usize, detection_px: &[f64; 4], detections: &[Detection], bo
 /// the image, is the edge of the rear if the side between them is seen.
 fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detection: &Detection) -> Option<f64> {
     let [left, _, right, _] = instance.mask.extent_px()?;
-    if left < 1.0 || right > f64::from(crate::camera::WIDTH_PX) - 1.0 {
+    let width_px = f64::from(camera.camera().resolution.width_px);
+    if left < 1.0 || right > width_px - 1.0 {
         return None;
     }
     let depth_m = camera.depth_m(ego, detection.face_x_m)?;
-    let middle = 0.5 * f64::from(crate::camera::WIDTH_PX);
+    let middle = 0.5 * width_px;
     // Rays to the right of the middle of the image have positive slopes, to the ego's left.
     let [low, high] = [left, right].map(|edge| (edge - middle) / camera.camera().focal_px);
     let at = |slope: f64, is_inner: bool| slope * if is_inner { depth_m + detection.length_m } else { depth_m };
@@ -167,7 +168,7 @@ fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detecti
 /// mask meets a flat road.
 fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &LaneGeometry) -> Option<Detection> {
     let [left, _, right, bottom] = instance.mask.extent_px()?;
-    if bottom > f64::from(crate::camera::HEIGHT_PX) - 1.0 {
+    if bottom > f64::from(camera.camera().resolution.height_px) - 1.0 {
         return None;
     }
     let ([x_m, y_m], below) = camera.on_ground(&scene.ego, [0.5 * (left + right), bottom])?;

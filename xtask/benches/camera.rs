@@ -7,7 +7,8 @@
 use std::hint::black_box;
 
 use closecall_sensors::camera::{
-    Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, HEIGHT_PX, PixelRect, RearCamera, WIDTH_PX,
+    Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, HEIGHT_PX, PixelRect, RearCamera,
+    Resolution, WIDTH_PX,
 };
 use closecall_sensors::{Scene, SceneVehicle};
 use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
@@ -47,7 +48,7 @@ fn crops(criterion: &mut Criterion) {
         criterion.bench_function(&format!("camera/{name}/crop"), |bencher| {
             bencher.iter(|| frame.crop(black_box(window), &mut crop))
         });
-        let mut frame = prepared(PixelRect::IMAGE);
+        let mut frame = prepared(Resolution::USUAL.image());
         criterion.bench_function(&format!("camera/{name}/picture of 320 x 144 px"), |bencher| {
             bencher.iter(|| frame.sampled(black_box(&columns), black_box(&rows)))
         });

@@ -136,7 +136,8 @@ pub(crate) fn add_body(
     let transform = Transform::new(placement, shading.lens);
     corners_in_camera(mesh, placement, &transform, shading, corners);
     let lens = shading.lens;
-    let projection = Projection { focal_px: lens.focal_px as f32, optics: &lens.optics };
+    let middle_px = lens.image.middle_px().map(|part| part as f32);
+    let projection = Projection { focal_px: lens.focal_px as f32, middle_px, optics: &lens.optics };
     for face in &mesh.faces {
         let in_camera = face.corners.map(|corner| corners[usize::from(corner)]);
         let edges = [1, 2].map(|to| each(|part| in_camera[to][part] - in_camera[0][part]));

@@ -1,12 +1,12 @@
 //! The configuration of the rear camera: the text in a scenario file, and its checked form.
 
-use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range, maths};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 use super::optics::{LensConfig, Optics};
-use super::picture::{FIELD_OF_VIEW_RAD, FOCAL_PX, WIDTH_PX};
+use super::picture::{FIELD_OF_VIEW_RAD, FOCAL_PX, Resolution, ResolutionConfig};
 use crate::kept::kept;
 
 /// Horizontal field of view of the usual camera (deg), with which the networks were trained.
@@ -16,6 +16,10 @@ const ROUNDING_DEG: f64 = 1e-9;
 
 fn is_usual_field(number: &Num) -> bool {
     *number == Num::Fixed(FIELD_OF_VIEW_DEG)
+}
+
+fn is_usual_resolution(resolution: &ResolutionConfig) -> bool {
+    *resolution == ResolutionConfig::default()
 }
 
 /// The processing of the camera's image.
@@ -68,10 +72,15 @@ pub struct CameraConfig {
     pub mount_from_rear_m: Num,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: Num,
-    /// Horizontal field of view (deg) of the 1280 columns of the image. The networks that ship were
+    /// Horizontal field of view (deg) of all columns of the image. The networks that ship were
     /// trained with 60°. Default: 60.
     #[serde(skip_serializing_if = "is_usual_field")]
     pub field_of_view_deg: Num,
+    /// Size of the image. Pixels are square: the number of rows gives the vertical field of view. The
+    /// networks that ship were trained with 1280 × 800 pixels, and the pipeline `mask-rcnn` needs this
+    /// size. Default: 1280 × 800 pixels.
+    #[serde(skip_serializing_if = "is_usual_resolution")]
+    pub resolution: ResolutionConfig,
     /// Root mean square of the angular rate of the camera's vibration (rad/s). Vibration blurs long
     /// exposures.
     pub vibration_radps: Num,
@@ -102,6 +111,7 @@ impl Default for CameraConfig {
             mount_from_rear_m: Num::Fixed(0.6),
             pitch_rad: Num::Fixed(0.03),
             field_of_view_deg: Num::Fixed(FIELD_OF_VIEW_DEG),
+            resolution: ResolutionConfig::default(),
             vibration_radps: Num::Fixed(0.05),
             dirt: Num::Fixed(0.05),
             exposure_ev: Num::Fixed(0.0),
@@ -139,6 +149,8 @@ pub struct Camera {
     pub pitch_rad: f64,
     /// Horizontal field of view (rad).
     pub field_of_view_rad: f64,
+    /// Size of the image.
+    pub resolution: Resolution,
     /// Focal length (px): half of the width of the image over the tangent of half of the field of
     /// view.
     pub focal_px: f64,
@@ -169,22 +181,30 @@ impl Check for CameraConfig {
         let number = |num, key, low, high| parameters.number(num, key, Range::closed(low, high));
         let half_turn = std::f64::consts::PI;
         let sun = |error: ConfigError| error.within("sun");
+        let resolution = self.resolution.check(parameters).map_err(|error| error.within("resolution"))?;
         let field_deg = number(&self.field_of_view_deg, "field-of-view-deg", 20.0, 120.0)?;
         let (field_of_view_rad, focal_px) = match (field_deg - FIELD_OF_VIEW_DEG).abs() <= ROUNDING_DEG {
-            true => (FIELD_OF_VIEW_RAD, FOCAL_PX),
+            true => (FIELD_OF_VIEW_RAD, FOCAL_PX * resolution.scale()),
             false => {
                 let field_rad = field_deg.to_radians();
-                (field_rad, f64::from(WIDTH_PX) / 2.0 / maths::tan(field_rad / 2.0))
+                (field_rad, f64::from(resolution.width_px) / 2.0 / maths::tan(field_rad / 2.0))
             }
         };
+        let pipeline = parameters.word(&self.pipeline, "pipeline")?;
+        if pipeline == Pipeline::MaskRcnn && resolution != Resolution::USUAL {
+            let Resolution { width_px, height_px } = Resolution::USUAL;
+            let rule = format!("the pipeline `mask-rcnn` reads images of {width_px} × {height_px} pixels only");
+            return Err(ConfigError::new("resolution", Problem::Contradiction { other: "pipeline", rule }));
+        }
         Ok(Camera {
-            pipeline: parameters.word(&self.pipeline, "pipeline")?,
+            pipeline,
             model: self.model.as_deref().map(kept),
             mask_rcnn: self.mask_rcnn.check(parameters).map_err(|error| error.within("mask-rcnn"))?,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", 0.4, 3.5)?,
             mount_from_rear_m: number(&self.mount_from_rear_m, "mount-from-rear-m", 0.0, 3.0)?,
             pitch_rad: number(&self.pitch_rad, "pitch-rad", -0.2, 0.3)?,
             field_of_view_rad,
+            resolution,
             focal_px,
             vibration_radps: number(&self.vibration_radps, "vibration-radps", 0.0, 1.0)?,
             dirt: parameters.number(&self.dirt, "dirt", Range::UNIT)?,
@@ -216,5 +236,32 @@ mod tests {
         let sun = SunConfig { elevation_rad: Num::Fixed(2.0), ..SunConfig::default() };
         let error = CameraConfig { sun, ..CameraConfig::default() }.check(&Parameters::default()).unwrap_err();
         assert!(error.to_string().starts_with("`sun.elevation-rad` is 2"), "{error}");
+    }
+
+    #[test]
+    fn the_default_size_is_not_written_and_another_size_is_read_again() {
+        let text = serde_json::to_string(&CameraConfig::default()).unwrap();
+        assert!(!text.contains("resolution"), "{text}");
+        let other: CameraConfig = toml::from_str("resolution = { width-px = 1920, height-px = 1208 }").unwrap();
+        assert_eq!(serde_json::from_value::<CameraConfig>(serde_json::to_value(&other).unwrap()).unwrap(), other);
+        let camera = other.check(&Parameters::default()).unwrap();
+        assert_eq!((camera.resolution.width_px, camera.resolution.height_px), (1_920, 1_208));
+        // As many pixels per tangent as columns: the field of view stays.
+        assert!((camera.focal_px - 1.5 * FOCAL_PX).abs() < 1e-9, "{}", camera.focal_px);
+    }
+
+    #[test]
+    fn a_wrong_size_is_reported_with_its_key_path_and_the_mask_rcnn_has_one_size() {
+        let refused = |text: &str| {
+            toml::from_str::<CameraConfig>(text).unwrap().check(&Parameters::default()).unwrap_err().to_string()
+        };
+        let error = refused("resolution.width-px = 0");
+        assert_eq!(error, "`resolution.width-px` is 0, but a number of columns from 640 to 3848 is needed");
+        let error = refused("pipeline = 'mask-rcnn'\nresolution = { width-px = 1920, height-px = 1208 }");
+        assert!(error.starts_with("`resolution` contradicts `pipeline`: "), "{error}");
+        assert!(error.contains("1280 × 800 pixels only"), "{error}");
+        let usual: CameraConfig =
+            toml::from_str("pipeline = 'mask-rcnn'\nresolution = { width-px = 1280, height-px = 800 }").unwrap();
+        assert!(usual.check(&Parameters::default()).is_ok());
     }
 }

@@ -17,7 +17,7 @@ use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
 use super::lanes::{mean, through_air};
 use super::line::Line;
 use super::mesh::{Texture, Vec3, dot, each};
-use super::picture::{HEIGHT_PX, WIDTH_PX};
+use super::picture::Resolution;
 use super::pinhole::PixelRect;
 use super::raster::Lattice;
 use super::sky;
@@ -25,16 +25,18 @@ use super::sky;
 impl Frame {
     /// Renders the whole image with the instance number of each pixel.
     pub fn image(&mut self) -> LabelledImage {
-        let [columns, rows] = [WIDTH_PX, HEIGHT_PX].map(|extent| (0..i32::from(extent)).collect::<Vec<i32>>());
+        let Resolution { width_px, height_px } = self.lens.image;
+        let [columns, rows] = [width_px, height_px].map(|extent| (0..i32::from(extent)).collect::<Vec<i32>>());
         self.sampled(&columns, &rows)
     }
 
     /// Renders every `step`-th pixel of the rows `rows` of the image, as a small picture for human
     /// viewers. Each pixel is identical to the same pixel of the whole image.
     pub fn preview(&mut self, step: u16, rows: std::ops::Range<u16>) -> Image {
-        let columns: Vec<i32> = (step / 2..WIDTH_PX).step_by(step.into()).map(i32::from).collect();
+        let Resolution { width_px, height_px } = self.lens.image;
+        let columns: Vec<i32> = (step / 2..width_px).step_by(step.into()).map(i32::from).collect();
         let rows: Vec<i32> =
-            (rows.start + step / 2..rows.end.min(HEIGHT_PX)).step_by(step.into()).map(i32::from).collect();
+            (rows.start + step / 2..rows.end.min(height_px)).step_by(step.into()).map(i32::from).collect();
         self.sampled(&columns, &rows).image
     }
 
@@ -71,10 +73,11 @@ impl Frame {
         let rows = sample_positions(window.top, window.height);
         crop.window = window;
         self.draw(&columns, &rows, &mut crop.rgb);
+        let Resolution { width_px, height_px } = self.lens.image;
         let is_inside = |position: i32, limit: u16| (0..i32::from(limit)).contains(&position);
         for (pixel, rgb) in crop.rgb.chunks_exact_mut(CHANNELS).enumerate() {
             let (column, row) = (columns[pixel % columns.len()], rows[pixel / columns.len()]);
-            if !(is_inside(column, WIDTH_PX) && is_inside(row, HEIGHT_PX)) {
+            if !(is_inside(column, width_px) && is_inside(row, height_px)) {
                 rgb.fill(0);
             }
         }

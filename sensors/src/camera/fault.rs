@@ -3,10 +3,11 @@
 //! the pixels of the exposure.
 
 use super::image::{CHANNELS, CROP_PX, Crop, Image, sample_positions};
+use super::picture::Resolution;
 use super::sampling::Sampling;
 use closecall_traffic::maths;
 
-/// Side of the cells of the image that a blot of dirt covers or leaves (px). On a lens of 5 mm with
+/// Side of the cells of the image that a blot of dirt covers or leaves (px of the usual image). On a lens of 5 mm with
 /// 1280 pixels, a blot of 0.15 mm covers about 40 pixels (assumption).
 const BLOT_PX: i32 = 40;
 /// Colour of light that has passed through dirt, sRGB (assumption: dark brown, as of dried road
@@ -35,25 +36,25 @@ pub struct CameraFault {
 }
 
 impl CameraFault {
-    /// Changes the pixels of a crop.
+    /// Changes the pixels of a crop of an image of this size.
     #[expect(clippy::cast_possible_truncation, reason = "pixels need no more than single precision")]
-    pub fn apply(&self, crop: &mut Crop) {
+    pub fn apply(&self, crop: &mut Crop, image: Resolution) {
         if self.dirt > 0.0 {
-            self.cover(crop);
+            self.cover(crop, image);
         }
         if self.blur_px > 0.0 {
             blur(crop, (self.blur_px * CROP_PX as f64 / f64::from(crop.window.width)) as f32);
         }
     }
 
-    /// Changes the pixels of a picture of the columns and rows `sampling` of the image.
+    /// Changes the pixels of a picture of the columns and rows `sampling` of an image of this size.
     #[expect(clippy::cast_possible_truncation, reason = "pixels need no more than single precision")]
-    pub fn apply_to_picture(&self, picture: &mut Image, sampling: &Sampling) {
+    pub fn apply_to_picture(&self, picture: &mut Image, sampling: &Sampling, image: Resolution) {
         if self.dirt > 0.0 {
             let places =
                 sampling.rows().iter().flat_map(|row| sampling.columns().iter().map(move |column| [column, row]));
             for (pixel, place) in picture.rgb.chunks_exact_mut(CHANNELS).zip(places) {
-                if is_blot(place.map(|at| at.div_euclid(BLOT_PX)), self.dirt) {
+                if is_blot(place.map(|at| cell_of(*at, image)), self.dirt) {
                     pixel.iter_mut().zip(DIRT_RGB).for_each(|(value, dirt)| *value = to_byte(dirt));
                 }
             }
@@ -64,16 +65,22 @@ impl CameraFault {
     }
 
     /// Covers the pixels that lie behind a blot.
-    fn cover(&self, crop: &mut Crop) {
+    fn cover(&self, crop: &mut Crop, image: Resolution) {
         let columns = sample_positions(crop.window.left, crop.window.width);
         let rows = sample_positions(crop.window.top, crop.window.height);
         for (index, pixel) in crop.rgb.chunks_exact_mut(CHANNELS).enumerate() {
-            let cell = [columns[index % CROP_PX], rows[index / CROP_PX]].map(|at| at.div_euclid(BLOT_PX));
+            let cell = [columns[index % CROP_PX], rows[index / CROP_PX]].map(|at| cell_of(at, image));
             if is_blot(cell, self.dirt) {
                 pixel.iter_mut().zip(DIRT_RGB).for_each(|(value, dirt)| *value = to_byte(dirt));
             }
         }
     }
+}
+
+/// Returns the cell that a column or a row of an image of this size is in. The cells cover the same
+/// part of each image.
+fn cell_of(at: i32, image: Resolution) -> i32 {
+    image.in_usual(at).div_euclid(BLOT_PX)
 }
 
 /// Returns whether a cell of the image lies behind a blot: the cells are covered at random with the

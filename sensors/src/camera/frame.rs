@@ -38,9 +38,9 @@ const MAX_DISTANCE_M: f64 = 400.0;
 /// grid.
 const SUBPIXEL_OFFSETS: [[i32; 2]; MOMENTS] = [[32, 160], [96, 32], [224, 96], [160, 224]];
 /// Margin by which bounds are enlarged to cover vibration, motion within the exposure, and rounding
-/// (px).
+/// (px of the usual image).
 const MARGIN_PX: f64 = 24.0;
-/// Maximum shift of the image by vibration during an exposure (px).
+/// Maximum shift of the image by vibration during an exposure (px of the usual image).
 const MAX_SHAKE_PX: f64 = 6.0;
 /// Interval at which the pattern of drops on the window changes, because drops move and are wiped
 /// away.
@@ -138,7 +138,12 @@ impl Frame {
         let mut frame = Self {
             lens,
             ground: Ground::new(scene.road, s_m, d_m, ego.heading_rad),
-            window: RearWindow { dirt: camera.dirt as f32, drops_key: mix(drops as u64), noise_key: key.0 },
+            window: RearWindow {
+                dirt: camera.dirt as f32,
+                drops_key: mix(drops as u64),
+                noise_key: key.0,
+                image: camera.resolution,
+            },
             subpixel: shaken_offsets(camera, &light, &lens, key),
             travelled_m: [0, 1, 2, 3].map(|moment| (ego.speed_mps * moment_offset(moment)) as f32 * light.exposure_s),
             light,
@@ -301,7 +306,7 @@ impl Frame {
                 self.lens.in_camera([x + sign(0), y + sign(1), up + self.lens.height_m + sign(2)])
             });
             if let Some(bounds) = self.lens.bounds(&corners) {
-                self.lists.clouds.push((widened(bounds), cloud));
+                self.lists.clouds.push((self.widened(bounds), cloud));
             }
         }
     }
@@ -325,7 +330,9 @@ impl Frame {
             let left = self.light.transmission(camera[2] as f32);
             let strength = if lamp.emission == Emission::Headlamp { 1.0 } else { 0.15 };
             let at_px = project(camera);
-            let halo = Glow::halo(at_px, camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
+            let scale = self.lens.image.scale() as f32;
+            let halo = Glow::halo(at_px, camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength))
+                .enlarged(scale);
             self.lists.glows.push((halo.bounds(), halo));
             let mirrored = self.lens.in_camera([ground[0], ground[1], -z]);
             if self.light.wetness > 0.0 && mirrored[2] > 1.0 {
@@ -344,7 +351,8 @@ impl Frame {
     fn add_ghosts(&mut self, source_px: [f32; 2], irradiance: Vec3) {
         let reflectance = self.lens.optics.surface_reflectance as f32;
         if reflectance > 0.0 {
-            let ghosts = Glow::ghosts(source_px, irradiance.map(|part| part * reflectance * reflectance));
+            let reflected = irradiance.map(|part| part * reflectance * reflectance);
+            let ghosts = Glow::ghosts(source_px, reflected, self.lens.image);
             self.lists.glows.extend(ghosts.map(|ghost| (ghost.bounds(), ghost)));
         }
     }
@@ -371,12 +379,13 @@ impl Frame {
     /// `None` if the box is not visible.
     fn bounds_of(&self, body: &GroundBox) -> Option<Bounds> {
         let corners = body.corners().map(|corner| self.lens.in_camera(corner));
-        self.lens.bounds(&corners).map(widened)
+        self.lens.bounds(&corners).map(|bounds| self.widened(bounds))
     }
-}
 
-fn widened([left, top, right, bottom]: [f64; 4]) -> Bounds {
-    [left - MARGIN_PX, top - MARGIN_PX, right + MARGIN_PX, bottom + MARGIN_PX].map(|bound| bound as f32)
+    fn widened(&self, [left, top, right, bottom]: [f64; 4]) -> Bounds {
+        let margin_px = MARGIN_PX * self.lens.image.scale().max(1.0);
+        [left - margin_px, top - margin_px, right + margin_px, bottom + margin_px].map(|bound| bound as f32)
+    }
 }
 
 fn bounds_of_rect(rect: &PixelRect) -> Bounds {
@@ -394,10 +403,11 @@ fn blinking(indicator: Indicator, time: Time) -> [bool; 2] {
 /// constant rate during the exposure.
 fn shaken_offsets(camera: &Camera, light: &Illumination, lens: &Lens, key: ExposureKey) -> [[i32; 2]; MOMENTS] {
     let [yaw, pitch, _] = normal3(mix(key.0 ^ 0x7368_616b));
+    let max_px = MAX_SHAKE_PX * lens.image.scale();
     #[expect(clippy::cast_possible_truncation, reason = "limited to a few pixels before the cast")]
     let shift = |rate: f32, moment: usize| {
         let turned = camera.vibration_radps * f64::from(rate * light.exposure_s) * moment_offset(moment);
-        ((turned * lens.focal_px).clamp(-MAX_SHAKE_PX, MAX_SHAKE_PX) * f64::from(SUBPIXEL_STEPS)) as i32
+        ((turned * lens.focal_px).clamp(-max_px, max_px) * f64::from(SUBPIXEL_STEPS)) as i32
     };
     std::array::from_fn(|moment| {
         let [x, y] = SUBPIXEL_OFFSETS[moment];

@@ -6,7 +6,7 @@
 
 use super::light::Illumination;
 use super::mesh::{Vec3, dot};
-use super::picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+use super::picture::{FOCAL_PX, Resolution};
 
 /// Cosine of the angle to the sun within which glare is visible: about 53°.
 const GLARE_FROM_COSINE: f32 = 0.6;
@@ -14,7 +14,7 @@ const GLARE_FROM_COSINE: f32 = 0.6;
 pub(crate) const NO_GLARE_TO_COSINE: f32 = GLARE_FROM_COSINE - 0.001;
 
 /// Places of the ghosts, as a multiple of the source's distance to the middle of the image, and
-/// their radii (px): an assumption, because each lens has its own. Ghosts are the sharper the
+/// their radii (px of the usual image): an assumption, because each lens has its own. Ghosts are the sharper the
 /// nearer the second reflection is to a focus.
 const GHOSTS: [[f32; 2]; 3] = [[-0.5, 60.0], [-1.1, 36.0], [0.35, 90.0]];
 
@@ -34,7 +34,8 @@ pub(crate) struct Glow {
 
 impl Glow {
     /// Returns the halo of a lamp at the depth `depth_m`. `facing` is the cosine of the angle
-    /// between the lamp's axis and the direction to the lens. Halos are used only in the dark.
+    /// between the lamp's axis and the direction to the lens. Halos are used only in the dark. The
+    /// size is the size in the usual image.
     pub(crate) fn halo(centre_px: [f32; 2], depth_m: f32, facing: f32, radiance: Vec3) -> Self {
         /// Depth at which the halo's size and strength have their nominal values (m).
         const REFERENCE_M: f32 = 30.0;
@@ -57,18 +58,23 @@ impl Glow {
         Self { centre_px, reach_px, peak: 0.0, radiance: halo.radiance.map(|x| x * 0.5 * wetness) }
     }
 
+    /// Returns the same glow in an image with so many times the pixels in each direction.
+    pub(crate) fn enlarged(self, scale: f32) -> Self {
+        Self { reach_px: self.reach_px.map(|reach_px| reach_px * scale), ..self }
+    }
+
     /// Returns the ghosts of a source at a position in the image (px): light that two surfaces of
     /// the lens have reflected appears again on the line through the middle of the image.
     /// `irradiance` is what all of it would bring to the lens.
-    pub(crate) fn ghosts(source_px: [f32; 2], irradiance: Vec3) -> [Self; GHOSTS.len()] {
-        let middle = [WIDTH_PX, HEIGHT_PX].map(|extent| f32::from(extent) / 2.0);
+    pub(crate) fn ghosts(source_px: [f32; 2], irradiance: Vec3, image: Resolution) -> [Self; GHOSTS.len()] {
+        let middle = image.middle_px().map(|part| part as f32);
         GHOSTS.map(|[place, radius_px]| {
             let centre_px = [0, 1].map(|axis| middle[axis] + place * (source_px[axis] - middle[axis]));
             let radius = radius_px / FOCAL_PX as f32;
             // The falloff of `add_to` without a peak has a third of the flux of a uniform disc.
             let solid_angle = std::f32::consts::PI * radius * radius / 3.0;
             let radiance = irradiance.map(|part| part / solid_angle);
-            Self { centre_px, reach_px: [radius_px; 2], peak: 0.0, radiance }
+            Self { centre_px, reach_px: [radius_px; 2], peak: 0.0, radiance }.enlarged(image.scale() as f32)
         })
     }
 
@@ -122,5 +128,18 @@ mod tests {
         assert_eq!(radiance_at(left), 0.0);
         assert_eq!(radiance_at(right), 0.0);
         assert!(radiance_at(100.0) > radiance_at(110.0) && radiance_at(110.0) > 0.0);
+    }
+
+    #[test]
+    fn a_ghost_in_an_image_of_twice_as_many_pixels_has_twice_the_radius_and_the_same_radiance() {
+        let twice = Resolution { width_px: 2_560, height_px: 1_600 };
+        let usual = Glow::ghosts([800.0, 300.0], [1.0; 3], Resolution::USUAL);
+        for (one, two) in usual.iter().zip(Glow::ghosts([1_600.0, 600.0], [1.0; 3], twice)) {
+            assert_eq!(two.reach_px, one.reach_px.map(|reach_px| 2.0 * reach_px));
+            assert_eq!(two.radiance, one.radiance);
+            for (place, wanted) in two.centre_px.iter().zip(one.centre_px) {
+                assert!((place - 2.0 * wanted).abs() < 1e-3);
+            }
+        }
     }
 }

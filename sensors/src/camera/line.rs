@@ -13,7 +13,6 @@ use super::effects::Effects;
 use super::ground::GROUND_TO_M;
 use super::ground::GroundNoise;
 use super::line_memory::LineMemory;
-use super::picture::{HEIGHT_PX, WIDTH_PX};
 use super::raster::SUBPIXEL_STEPS;
 use super::sky::SkyNoise;
 
@@ -55,8 +54,9 @@ impl<'a> Line<'a> {
     pub(super) fn new(frame: &Frame, columns: &'a [i32], memory: LineMemory) -> Self {
         let LineMemory { effects, mut x } = memory;
         let is_straight = frame.lens.optics.is_straight();
+        let width_px = frame.lens.image.width_px;
         let x_at = |column: &i32| {
-            std::array::from_fn(|moment| coordinate(frame, [*column, WIDTH_PX.into()], subpixel(frame, moment)[0]))
+            std::array::from_fn(|moment| coordinate(frame, [*column, width_px.into()], subpixel(frame, moment)[0]))
         };
         x.clear();
         if is_straight {
@@ -90,7 +90,8 @@ impl<'a> Line<'a> {
         self.row = row;
         let [left, right] = [self.columns.first(), self.columns.last()].map(|column| column.map_or(0, |at| *at) as f32);
         self.effects.select(effects, &[left, row as f32, right + 1.0, row as f32 + 1.0]);
-        self.y = std::array::from_fn(|moment| coordinate(frame, [row, HEIGHT_PX.into()], subpixel(frame, moment)[1]));
+        let height_px = frame.lens.image.height_px;
+        self.y = std::array::from_fn(|moment| coordinate(frame, [row, height_px.into()], subpixel(frame, moment)[1]));
         let further = frame.travelled_at(row);
         self.travelled_m = frame.travelled_m.map(|travelled_m| travelled_m + further);
         if !self.is_straight {
@@ -115,7 +116,8 @@ impl<'a> Line<'a> {
         if self.is_straight {
             return [self.x[place][moment], self.y[moment]];
         }
-        let x = coordinate(frame, [self.columns[place], WIDTH_PX.into()], subpixel(frame, moment)[0]);
+        let width_px = frame.lens.image.width_px;
+        let x = coordinate(frame, [self.columns[place], width_px.into()], subpixel(frame, moment)[0]);
         frame.lens.optics.undistorted([x, self.y[moment]].map(f64::from)).map(|part| part as f32)
     }
 

@@ -10,7 +10,7 @@
 //! needs ONNX Runtime.
 //!
 //! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers
-//! 60° horizontally. A simulated run renders only the pixels that a network reads. Each pixel of a
+//! 60° horizontally, unless a scenario says otherwise. A simulated run renders only the pixels that a network reads. Each pixel of a
 //! crop is identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
 
 mod background;
@@ -68,7 +68,7 @@ pub use labels::LabelMap;
 pub use mask_rcnn_config::{MaskRcnn, MaskRcnnConfig, MaskRcnnInput, SHIPPED_MIN_SHOWN_PX, SHIPPED_MISSED};
 pub use network::Network;
 pub use optics::{LensConfig, Optics};
-pub use picture::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
+pub use picture::{FOCAL_PX, HEIGHT_PX, Resolution, ResolutionConfig, WIDTH_PX};
 pub use pinhole::{GroundBox, PixelRect};
 pub use pipeline::{CropClassifier, ImagedScene, MIN_SHARE_IN_IMAGE, fuse, is_beside_road};
 pub use rear_camera::RearCamera;

@@ -9,8 +9,6 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::picture::{HEIGHT_PX, WIDTH_PX};
-
 /// Tangent of the angle to the axis up to which the polynomial of the distortion holds: just beyond
 /// the corners of the image, which lie at 0.68. Farther out the distortion continues linearly.
 const POLYNOMIAL_TO: f64 = 0.75;
@@ -133,9 +131,8 @@ impl Optics {
     }
 
     /// Returns the bounds in the distorted image of a rectangle `[left, top, right, bottom]` of the
-    /// ideal image (px).
-    pub(crate) fn bounds(&self, [left, top, right, bottom]: [f64; 4], focal_px: f64) -> [f64; 4] {
-        let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
+    /// ideal image (px), whose middle is `centre` (px).
+    pub(crate) fn bounds(&self, [left, top, right, bottom]: [f64; 4], centre: [f64; 2], focal_px: f64) -> [f64; 4] {
         let tangents = |low: f64, high: f64, axis: usize| {
             let [low, high] = [low, high].map(|at| (at - centre[axis]) / focal_px);
             // A line of the rectangle deviates most at its ends, or where it is nearest to the
@@ -195,7 +192,7 @@ mod tests {
                 let pixel = |[x, y]: [f64; 2]| [640.0 + FOCAL_PX * x, 400.0 + FOCAL_PX * y];
                 let [left, top] = pixel(corner);
                 let [right, bottom] = pixel([corner[0] + size[0], corner[1] + size[1]]);
-                let bounds = lens.bounds([left, top, right, bottom], FOCAL_PX);
+                let bounds = lens.bounds([left, top, right, bottom], [640.0, 400.0], FOCAL_PX);
                 let [u, v] = pixel(lens.distorted([corner[0] + at[0] * size[0], corner[1] + at[1] * size[1]]));
                 prop_assert!(bounds[0] - 1e-6 <= u && u <= bounds[2] + 1e-6, "{u} in {bounds:?}");
                 prop_assert!(bounds[1] - 1e-6 <= v && v <= bounds[3] + 1e-6, "{v} in {bounds:?}");

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   ground frame G                          image
-//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px = 60° (`field-of-view-deg`)
+//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px (`resolution`) = 60° (`field-of-view-deg`)
 //!   x along the ego's heading, y left, z up   │
 //!                                             ▼ v, 800 px
 //!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
@@ -16,7 +16,7 @@ use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::Camera;
 use super::optics::Optics;
-use super::picture::{HEIGHT_PX, WIDTH_PX};
+use super::picture::Resolution;
 
 /// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body
 /// lies there.
@@ -36,16 +36,13 @@ pub struct PixelRect {
 }
 
 impl PixelRect {
-    /// The whole image.
-    pub const IMAGE: Self = Self { left: 0, top: 0, width: WIDTH_PX as u32, height: HEIGHT_PX as u32 };
-
-    /// Returns the share of the rectangle's area that lies in the image (0 to 1).
-    pub fn share_in_image(&self) -> f64 {
+    /// Returns the share of the rectangle's area that lies in an image of this size (0 to 1).
+    pub fn share_in_image(&self, image: Resolution) -> f64 {
         let overlap = |start: i32, extent: u32, limit: u16| {
             let end = i64::from(start) + i64::from(extent);
             (end.min(limit.into()) - i64::from(start.max(0))).max(0) as f64 / f64::from(extent.max(1))
         };
-        overlap(self.left, self.width, WIDTH_PX) * overlap(self.top, self.height, HEIGHT_PX)
+        overlap(self.left, self.width, image.width_px) * overlap(self.top, self.height, image.height_px)
     }
 }
 
@@ -87,6 +84,8 @@ pub(crate) struct Lens {
     pub(crate) focal_px: f64,
     /// The same, up to rounding, as the camera states it (px).
     stated_focal_px: f64,
+    /// Size of the image.
+    pub(crate) image: Resolution,
     /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind
     /// the centre.
     pub(crate) ahead_m: f64,
@@ -110,8 +109,9 @@ impl Lens {
         // higher.
         let pitch = camera.pitch_rad - ego.pitch_rad;
         Self {
-            focal_px: f64::from(WIDTH_PX) / 2.0 / maths::tan(camera.field_of_view_rad / 2.0),
+            focal_px: f64::from(camera.resolution.width_px) / 2.0 / maths::tan(camera.field_of_view_rad / 2.0),
             stated_focal_px: camera.focal_px,
+            image: camera.resolution,
             ahead_m,
             height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
             sin_pitch: maths::sin(pitch),
@@ -145,7 +145,8 @@ impl Lens {
 
     /// Projects a point in camera axes to the image of a pinhole camera (px).
     fn pinhole_pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
-        [f64::from(WIDTH_PX) / 2.0 + self.focal_px * x / z, f64::from(HEIGHT_PX) / 2.0 + self.focal_px * y / z]
+        let [u, v] = self.image.middle_px();
+        [u + self.focal_px * x / z, v + self.focal_px * y / z]
     }
 
     /// Returns the position in camera axes of a moving point when the row of the image is read in
@@ -159,7 +160,7 @@ impl Lens {
 
     /// Returns when a row of the image is read, relative to the middle row (s).
     pub(crate) fn read_after_s(&self, row: f64) -> f64 {
-        self.readout_s * (row / f64::from(HEIGHT_PX) - 0.5).clamp(-0.5, 0.5)
+        self.readout_s * (row / f64::from(self.image.height_px) - 0.5).clamp(-0.5, 0.5)
     }
 
     /// Rotates a direction from the ground frame into camera axes.
@@ -203,8 +204,11 @@ impl Lens {
             }
         }
         let is_visible = bounds[0] <= bounds[2];
-        is_visible
-            .then(|| if self.optics.is_straight() { bounds } else { self.optics.bounds(bounds, self.stated_focal_px) })
+        let middle_px = self.image.middle_px();
+        is_visible.then(|| match self.optics.is_straight() {
+            true => bounds,
+            false => self.optics.bounds(bounds, middle_px, self.stated_focal_px),
+        })
     }
 }
 
@@ -215,7 +219,7 @@ mod tests {
     use super::*;
     use crate::camera::CameraConfig;
     use crate::camera::FOCAL_PX;
-    use crate::camera::picture::FIELD_OF_VIEW_RAD;
+    use crate::camera::picture::{FIELD_OF_VIEW_RAD, ResolutionConfig, WIDTH_PX};
     use closecall_traffic::{Check, Parameters};
 
     fn lens(pitch_rad: f64) -> Lens {
@@ -267,6 +271,32 @@ mod tests {
         let config = CameraConfig { field_of_view_deg: Num::Fixed(130.0), ..CameraConfig::default() };
         let error = config.check(&Parameters::default()).unwrap_err().to_string();
         assert_eq!(error, "`field-of-view-deg` is 130, but a number from 20 to 120 is needed");
+    }
+
+    #[test]
+    fn an_image_of_twice_as_many_pixels_shows_each_point_at_twice_the_pixel() {
+        let resolution = ResolutionConfig { width_px: 2_560, height_px: 1_600 };
+        let fine = lens_of(&CameraConfig { resolution, ..CameraConfig::default() }, 0.0);
+        let usual = lens(0.0);
+        assert!((fine.focal_px - fine.stated_focal_px).abs() < 1e-9);
+        for point in [[-5.0, 2.0, 0.0], [-20.0, 3.75, 1.5], [-80.0, -7.5, 0.3]] {
+            let [coarse, twice] = [usual, fine].map(|lens| lens.pixel(lens.in_camera(point)));
+            for (one, two) in coarse.iter().zip(twice) {
+                assert!((two - 2.0 * one).abs() < 1e-9, "{two} is not twice {one}");
+            }
+        }
+    }
+
+    #[test]
+    fn more_rows_show_more_above_and_below_and_leave_the_columns() {
+        let resolution = ResolutionConfig { height_px: 1_000, ..ResolutionConfig::default() };
+        let tall = lens_of(&CameraConfig { resolution, ..CameraConfig::default() }, 0.0);
+        let [u, v] = tall.pixel([1.0, -0.5, 10.0]);
+        let [usual_u, usual_v] = lens(0.0).pixel([1.0, -0.5, 10.0]);
+        assert!((u - usual_u).abs() < 1e-9 && (v - usual_v - 100.0).abs() < 1e-9);
+        // Half of a window that reaches below the usual image lies in it, and all in the taller one.
+        let window = PixelRect { left: 0, top: 750, width: 100, height: 100 };
+        assert_eq!([Resolution::USUAL, tall.image].map(|image| window.share_in_image(image)), [0.5, 1.0]);
     }
 
     #[test]

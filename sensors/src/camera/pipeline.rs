@@ -116,7 +116,7 @@ impl CropClassifier {
         for (index, window) in self.due.iter().zip(&self.windows) {
             frame.crop(*window, &mut self.crop);
             if let Some(fault) = fault {
-                fault.apply(&mut self.crop);
+                fault.apply(&mut self.crop, self.camera.camera().resolution);
             }
             let image_scores = self.classifier.classify(&self.crop)?;
             memory.store(&detections[*index], image_scores);
@@ -131,7 +131,8 @@ impl RearCamera {
     /// Returns the window of the image that the network classifies for a detection. Returns `None`
     /// if too little of the window lies in the image.
     pub fn detection_window(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
-        self.project(ego, &ground_box(detection)).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
+        let image = self.camera().resolution;
+        self.project(ego, &ground_box(detection)).filter(|window| window.share_in_image(image) >= MIN_SHARE_IN_IMAGE)
     }
 }
 

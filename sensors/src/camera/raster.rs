@@ -9,7 +9,6 @@
 use super::body::MOMENTS;
 use super::mesh::Vec3;
 use super::optics::Optics;
-use super::picture::{HEIGHT_PX, WIDTH_PX};
 use super::pinhole::NEAR_M;
 
 /// Number of steps of the fixed-point grid per pixel.
@@ -117,6 +116,8 @@ impl Visibility {
 pub(crate) struct Projection<'a> {
     /// Focal length (px).
     pub(crate) focal_px: f32,
+    /// Middle of the image (px).
+    pub(crate) middle_px: [f32; 2],
     /// How the lens differs from a pinhole. The corners of triangles are distorted, and their edges
     /// remain straight.
     pub(crate) optics: &'a Optics,
@@ -143,7 +144,8 @@ pub(crate) fn project(
     out: &mut Vec<ScreenTriangle>,
 ) {
     let focal_px = f64::from(projection.focal_px);
-    let plane = Plane { normal: normal.map(f64::from), offset: f64::from(offset), focal_px };
+    let middle_px = projection.middle_px.map(f64::from);
+    let plane = Plane { normal: normal.map(f64::from), offset: f64::from(offset), focal_px, middle_px };
     let near = NEAR_M as f32;
     if corners.iter().all(|corner| corner[2] >= near) {
         append(corners, projection, &plane, face, out);
@@ -168,11 +170,12 @@ pub(crate) fn project(
     }
 }
 
-/// The plane of a face in camera axes, normal · p = offset, and the focal length.
+/// The plane of a face in camera axes, normal · p = offset, and the projection.
 struct Plane {
     normal: [f64; 3],
     offset: f64,
     focal_px: f64,
+    middle_px: [f64; 2],
 }
 
 impl Plane {
@@ -181,7 +184,7 @@ impl Plane {
         // The ray (x, y, 1)·depth intersects the plane at depth·(normal · ray) = offset.
         let steps = f64::from(SUBPIXEL_STEPS);
         let [nx, ny, nz] = self.normal.map(|part| part / self.offset);
-        let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
+        let centre = self.middle_px;
         let slope = [nx, ny].map(|part| part / (self.focal_px * steps));
         let constant = nz - (nx * centre[0] + ny * centre[1]) / self.focal_px;
         [slope[0], slope[1], constant]
@@ -209,14 +212,14 @@ fn rounded(x: f32) -> i32 {
 }
 
 /// Projects a point in camera axes to the fixed-point grid.
-fn snap([x, y, z]: Vec3, Projection { focal_px, optics }: Projection<'_>) -> [i32; 2] {
+fn snap([x, y, z]: Vec3, Projection { focal_px, middle_px, optics }: Projection<'_>) -> [i32; 2] {
     let steps = SUBPIXEL_STEPS as f32;
-    let to_grid = |centre: u16, offset: f32| rounded((f32::from(centre) / 2.0 + offset) * steps);
+    let to_grid = |middle: f32, offset: f32| rounded((middle + offset) * steps);
     if optics.is_straight() {
-        return [to_grid(WIDTH_PX, focal_px * x / z), to_grid(HEIGHT_PX, focal_px * y / z)];
+        return [to_grid(middle_px[0], focal_px * x / z), to_grid(middle_px[1], focal_px * y / z)];
     }
     let [x, y] = optics.distorted([x / z, y / z].map(f64::from)).map(|part| focal_px * part as f32);
-    [to_grid(WIDTH_PX, x), to_grid(HEIGHT_PX, y)]
+    [to_grid(middle_px[0], x), to_grid(middle_px[1], y)]
 }
 
 fn append(at: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
@@ -255,7 +258,7 @@ mod tests {
     use super::*;
     use crate::camera::mesh::{cross, dot, sub};
 
-    const PINHOLE: Projection<'_> = Projection { focal_px: 1000.0, optics: &STRAIGHT };
+    const PINHOLE: Projection<'_> = Projection { focal_px: 1000.0, middle_px: [640.0, 400.0], optics: &STRAIGHT };
     const STRAIGHT: Optics = Optics { distortion: [0.0; 2], vignetting: 0.0, surface_reflectance: 0.0 };
 
     fn rasterised(triangles: &[ScreenTriangle], columns: &[i32], rows: &[i32]) -> Visibility {

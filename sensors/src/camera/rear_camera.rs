@@ -12,7 +12,7 @@ const WINDOW_TO_OBJECT_RATIO: f64 = 1.3;
 /// Minimum width of a window, measured at the object's distance (m), so that a crop of a single
 /// post also shows its surroundings.
 const MIN_WINDOW_WIDTH_M: f64 = 2.2;
-/// Maximum width of a window (px).
+/// Maximum width of a window (px of the usual image).
 const MAX_WINDOW_WIDTH_PX: f64 = 2_400.0;
 /// A box has a window only if part of it lies deeper than this along the optical axis (m).
 const MIN_DEPTH_M: f64 = 1.5;
@@ -47,7 +47,8 @@ impl RearCamera {
         }
         let [left, top, right, bottom] = lens.bounds(&corners)?;
         let min_side = MIN_WINDOW_WIDTH_M * lens.focal_px / nearest.max(NEAR_M).max(MIN_DEPTH_M);
-        let side = ((right - left).max(bottom - top) * WINDOW_TO_OBJECT_RATIO).max(min_side).min(MAX_WINDOW_WIDTH_PX);
+        let max_side = MAX_WINDOW_WIDTH_PX * lens.image.scale();
+        let side = ((right - left).max(bottom - top) * WINDOW_TO_OBJECT_RATIO).max(min_side).min(max_side);
         if !(side >= 1.0) {
             return None;
         }
@@ -62,7 +63,7 @@ impl RearCamera {
 
     /// Renders the whole image, and for each pixel the vehicle that it shows.
     pub fn render_image(&self, scene: &Scene<'_>, key: ExposureKey) -> LabelledImage {
-        Frame::new(&self.camera, scene, key, &[PixelRect::IMAGE]).image()
+        Frame::new(&self.camera, scene, key, &[self.camera.resolution.image()]).image()
     }
 
     /// Renders the crop of one window. For several windows of the same exposure, prepare one
@@ -81,7 +82,7 @@ mod tests {
 
     use super::super::CameraConfig;
     use super::super::image::{CROP_PX, sample_positions};
-    use super::super::picture::WIDTH_PX;
+    use super::super::picture::{Resolution, ResolutionConfig, WIDTH_PX};
     use super::*;
 
     fn rear_camera() -> RearCamera {
@@ -160,7 +161,7 @@ mod tests {
             let scene =
                 Scene { time: Time::from_ms(880), road: &road, environment: &environment, ego, others: &others };
             let whole = camera.render_image(&scene, ExposureKey(42)).image;
-            let mut frame = Frame::new(camera.camera(), &scene, ExposureKey(42), &[PixelRect::IMAGE]);
+            let mut frame = Frame::new(camera.camera(), &scene, ExposureKey(42), &[camera.camera().resolution.image()]);
             let sampled = frame.sampled(&columns, &rows).image;
             let expected = rows.iter().flat_map(|y| {
                 columns.iter().flat_map(|x| {
@@ -197,6 +198,53 @@ mod tests {
         for light in [Light::Day, Light::Dusk, Light::Night] {
             assert_crops_match(&rear_camera(), light, &windows);
             assert_crops_match(&real_camera(), light, &windows);
+        }
+    }
+
+    fn with_size(width_px: u64, height_px: u64) -> RearCamera {
+        camera_with(|config| config.resolution = ResolutionConfig { width_px, height_px })
+    }
+
+    #[test]
+    fn a_crop_of_an_image_of_any_size_has_the_bits_of_the_whole_image() {
+        let square = |left, top, side| PixelRect { left, top, width: side, height: side };
+        for (size, windows) in [
+            ((640, 480), [square(300, 230, 32), square(-20, 300, 200), square(600, 400, 100)]),
+            ((1_921, 1_209), [square(900, 590, 64), square(700, 500, 401), square(1_880, 1_150, 150)]),
+        ] {
+            assert_crops_match(&with_size(size.0, size.1), Light::Night, &windows);
+        }
+    }
+
+    #[test]
+    fn the_image_has_the_size_and_twice_the_pixels_show_the_same_scene_finer() {
+        let picture = rendered(&with_size(2_560, 1_600), Light::Day, AS_PLACED);
+        assert_eq!((picture.image.width, picture.image.height), (2_560, 1_600));
+        assert_eq!((picture.image.rgb.len(), picture.instances.len()), (3 * 2_560 * 1_600, 2_560 * 1_600));
+        let usual = rendered(&rear_camera(), Light::Day, AS_PLACED);
+        let shown = |picture: &LabelledImage| picture.instances.iter().filter(|instance| **instance == 1).count();
+        let ratio = shown(&picture) as f64 / shown(&usual) as f64;
+        assert!((3.9..4.1).contains(&ratio), "the car covers {ratio} times the pixels");
+        // The vehicle that a pixel shows is the vehicle that the same place of the fine image shows,
+        // but for the edges.
+        let differ = (0..800).flat_map(|row| (0..1_280).map(move |column| (row, column))).filter(|(row, column)| {
+            usual.instances[row * 1_280 + column] != picture.instances[2 * row * 2_560 + 2 * column]
+        });
+        assert!(differ.count() < 2_000);
+    }
+
+    #[test]
+    fn the_window_of_a_vehicle_has_twice_the_side_in_twice_the_pixels() {
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        // The vehicle nearest to the lens has the largest window that is allowed.
+        for x_m in [-60.0, -20.0, -5.2] {
+            let at = GroundBox { x_m, y_m: 1.0, heading_rad: 0.0, length_m: 4.6, width_m: 2.5, height_m: 1.5 };
+            let [usual, fine] =
+                [rear_camera(), with_size(2_560, 1_600)].map(|camera| camera.project(&ego, &at).unwrap());
+            for (one, two) in [(usual.left, fine.left), (usual.top, fine.top), (usual.width as i32, fine.width as i32)]
+            {
+                assert!((two - 2 * one).abs() <= 2, "{two} is not twice {one}");
+            }
         }
     }
 
@@ -340,7 +388,7 @@ mod tests {
         assert_eq!(
             rear_camera()
                 .project(&ego, &box_at(0.0))
-                .map(|window| window.share_in_image())
+                .map(|window| window.share_in_image(Resolution::USUAL))
                 .filter(|share| *share > 0.0),
             None
         );

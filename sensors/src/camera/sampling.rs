@@ -4,7 +4,7 @@
 //! near objects are large. A few pixels therefore carry as much information as all pixels. Other
 //! pixels need not be rendered.
 
-use super::picture::{HEIGHT_PX, WIDTH_PX};
+use super::picture::{HEIGHT_PX, Resolution, WIDTH_PX};
 
 /// The columns and rows of the image that a network reads, in ascending order.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,21 +23,21 @@ pub struct SamplingError {
 }
 
 impl Sampling {
-    /// Returns every pixel of the image.
+    /// Returns every pixel of the usual image.
     pub fn all() -> Self {
         Self { columns: (0..i32::from(WIDTH_PX)).collect(), rows: (0..i32::from(HEIGHT_PX)).collect() }
     }
 
-    /// Returns every `step`-th column and row.
-    pub fn every(step: u8) -> Self {
+    /// Returns every `step`-th column and row of an image of this size.
+    pub fn every(step: u8, image: Resolution) -> Self {
         let every = |size: u16| (0..i32::from(size)).step_by(usize::from(step.max(1))).collect();
-        Self { columns: every(WIDTH_PX), rows: every(HEIGHT_PX) }
+        Self { columns: every(image.width_px), rows: every(image.height_px) }
     }
 
     /// Reads columns and rows from whole numbers, separated by blanks.
     ///
     /// # Errors
-    /// [`SamplingError`] if the numbers do not ascend, or lie outside of the image.
+    /// [`SamplingError`] if the numbers do not ascend, or lie outside of the usual image.
     pub fn parse(columns: &str, rows: &str) -> Result<Self, SamplingError> {
         let read = |axis, text: &str, limit: u16| {
             let numbers: Option<Vec<i32>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
@@ -72,9 +72,11 @@ mod tests {
 
     #[test]
     fn every_step_is_a_part_of_all() {
-        assert_eq!(Sampling::every(1), Sampling::all());
-        let second = Sampling::every(2);
+        assert_eq!(Sampling::every(1, Resolution::USUAL), Sampling::all());
+        let second = Sampling::every(2, Resolution::USUAL);
         assert_eq!((second.columns().len(), second.rows().len(), second.columns()[3]), (640, 400, 6));
+        let odd = Sampling::every(3, Resolution { width_px: 641, height_px: 480 });
+        assert_eq!((odd.columns().len(), odd.rows().len(), odd.columns().last()), (214, 160, Some(&639)));
     }
 
     #[test]

@@ -10,10 +10,10 @@ use super::fault::CameraFault;
 use super::instance::Instance;
 use super::labels::LabelMap;
 use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
-use super::picture::{HEIGHT_PX, WIDTH_PX};
+use super::picture::Resolution;
 use super::pinhole::Lens;
 use super::pipeline::ground_box;
-use super::{Camera, CameraConfig, ExposureKey, Frame, FrameBuffers, PixelRect, RearCamera};
+use super::{Camera, CameraConfig, ExposureKey, Frame, FrameBuffers, RearCamera};
 
 /// The camera and the instance detector of one worker thread.
 #[derive(Debug)]
@@ -87,7 +87,8 @@ impl WholeImageDetector {
         fault: Option<&CameraFault>,
     ) -> Result<Vec<Instance>, ClassifierError> {
         let lists = std::mem::take(&mut self.lists);
-        let mut frame = Frame::with_buffers(lists, self.camera.camera(), imaged, key, &[PixelRect::IMAGE]);
+        let camera = self.camera.camera();
+        let mut frame = Frame::with_buffers(lists, camera, imaged, key, &[camera.resolution.image()]);
         if let Some(fault) = fault {
             frame.add_glare(fault, imaged);
         }
@@ -95,7 +96,7 @@ impl WholeImageDetector {
         let mut picture = frame.sampled(sampling.columns(), sampling.rows()).image;
         self.lists = frame.into_buffers();
         if let Some(fault) = fault {
-            fault.apply_to_picture(&mut picture, sampling);
+            fault.apply_to_picture(&mut picture, sampling, self.camera.camera().resolution);
         }
         self.detector.detect(&picture)
     }
@@ -109,7 +110,8 @@ impl RearCamera {
         let mut object = ground_box(detection);
         object.x_m -= lens.ahead_m;
         let [left, top, right, bottom] = lens.bounds(&object.corners().map(|corner| lens.in_camera(corner)))?;
-        let [width, height] = [f64::from(WIDTH_PX), f64::from(HEIGHT_PX)];
+        let Resolution { width_px, height_px } = self.camera().resolution;
+        let [width, height] = [width_px, height_px].map(f64::from);
         let inside = [left.max(0.0), top.max(0.0), right.min(width), bottom.min(height)];
         (inside[0] < inside[2] && inside[1] < inside[3]).then_some(inside)
     }
@@ -127,7 +129,8 @@ impl RearCamera {
     pub fn on_ground(&self, ego: &SceneVehicle, [u, v]: [f64; 2]) -> Option<([f64; 2], f64)> {
         let lens = Lens::new(self.camera(), ego);
         let focal_px = self.camera().focal_px;
-        let mut at = [(u - f64::from(WIDTH_PX) / 2.0) / focal_px, (v - f64::from(HEIGHT_PX) / 2.0) / focal_px];
+        let middle = self.camera().resolution.middle_px();
+        let mut at = [(u - middle[0]) / focal_px, (v - middle[1]) / focal_px];
         if !lens.optics.is_straight() {
             at = lens.optics.undistorted(at);
         }

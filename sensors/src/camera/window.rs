@@ -8,11 +8,12 @@ use wide::f32x4;
 use super::hash::{mix_at, normal3, unit};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
+use super::picture::Resolution;
 
-/// Side of the square cells of the window (px). A cell holds at most one speck of dirt and one
+/// Side of the square cells of the window (px of the usual image). A cell holds at most one speck of dirt and one
 /// drop.
 const CELL_PX: i32 = 44;
-/// Width and height of the cells in which at most one streak of rain falls (px).
+/// Width and height of the cells in which at most one streak of rain falls (px of the usual image).
 const STREAK_CELL_PX: [i32; 2] = [11, 64];
 /// Share of the window that drops cover in heavy rain (0 to 1), and the rain rate at which they
 /// cover half of that share (mm/h).
@@ -30,6 +31,8 @@ pub(crate) struct RearWindow {
     pub(crate) drops_key: u64,
     /// Key of the sensor noise and of the rain streaks. It changes with every exposure.
     pub(crate) noise_key: u64,
+    /// Size of the image. Dirt, drops and streaks cover the same share of each image.
+    pub(crate) image: Resolution,
 }
 
 /// The effect of one blot, a speck of dirt or a drop, on the light that passes through a pixel.
@@ -43,6 +46,7 @@ struct Blot {
 impl RearWindow {
     /// Returns the radiance that reaches the sensor, given the radiance of the scene.
     pub(crate) fn transmitted(&self, pixel: [i32; 2], scene: Vec3, light: &Illumination) -> Vec3 {
+        let pixel = pixel.map(|at| self.image.in_usual(at));
         let mut radiance = scene;
         if self.dirt > 0.0
             && let Some(blot) = blot_at(DIRT_KEY, pixel, self.dirt)
@@ -125,7 +129,7 @@ mod tests {
     use super::*;
     use crate::camera::CameraConfig;
 
-    const WINDOW: RearWindow = RearWindow { dirt: 0.0, drops_key: 1, noise_key: 2 };
+    const WINDOW: RearWindow = RearWindow { dirt: 0.0, drops_key: 1, noise_key: 2, image: Resolution::USUAL };
 
     fn light(environment: Environment) -> Illumination {
         let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
@@ -154,5 +158,19 @@ mod tests {
         }
         let soiled = RearWindow { dirt: 1.0, ..WINDOW };
         assert!((0..500).any(|u| soiled.transmitted([u, 20], [0.3, 0.4, 0.5], &day)[0] < 0.29));
+    }
+
+    #[test]
+    fn dirt_and_rain_cover_the_same_part_of_an_image_with_more_pixels() {
+        let rain = light(Environment { rain_mm_per_h: 20.0, ..Environment::CLEAR_DAY });
+        let usual = RearWindow { dirt: 0.5, ..WINDOW };
+        let fine = RearWindow { image: Resolution { width_px: 2_560, height_px: 1_600 }, ..usual };
+        let seen = |window: &RearWindow, pixel: [i32; 2]| window.transmitted(pixel, [0.3, 0.4, 0.5], &rain);
+        let mut differ = 0;
+        for (u, v) in (0..300).flat_map(|u| (0..60).map(move |v| (u, v))) {
+            assert_eq!(seen(&usual, [u, v]), seen(&fine, [2 * u + 1, 2 * v]));
+            differ += usize::from(seen(&usual, [u, v]) != seen(&fine, [u, v]));
+        }
+        assert!(differ > 100, "the pattern does not depend on the pixel");
     }
 }

@@ -90,7 +90,9 @@ impl Crops {
 }
 
 fn window(camera: &RearCamera, scene: &RandomScene, cluster_box: &GroundBox) -> Option<PixelRect> {
-    camera.project(&scene.ego, cluster_box).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
+    camera
+        .project(&scene.ego, cluster_box)
+        .filter(|window| window.share_in_image(camera.camera().resolution) >= MIN_SHARE_IN_IMAGE)
 }
 
 /// Renders a crop, and returns the share of its samples that show the vehicle with this index.

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use crate::camera::{ExposureKey, Frame, PixelRect, Sampling, mix};
+use crate::camera::{ExposureKey, Frame, Sampling, mix};
 
 use super::files::Output;
 use super::options::USUAL_VEHICLES;
@@ -46,7 +46,7 @@ pub fn render_sampled(
         };
         let scene = RandomScene::draw(set, vehicles, &mut scene_rng(set, seed, index)?)?;
         let key = ExposureKey(mix(seed ^ u64::from(index)));
-        let mut frame = Frame::new(&scene.camera, &scene.scene(), key, &[PixelRect::IMAGE]);
+        let mut frame = Frame::new(&scene.camera, &scene.scene(), key, &[scene.camera.resolution.image()]);
         let picture = frame.sampled(sampling.columns(), sampling.rows());
         pixels.extend_from_slice(&picture.image.rgb);
         instances.extend(picture.instances.iter().map(|instance| u8::try_from(*instance).unwrap_or(u8::MAX)));

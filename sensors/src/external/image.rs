@@ -3,7 +3,7 @@
 use closecall_traffic::{Stream, Time};
 
 use super::settings::ImageSettings;
-use crate::camera::{Camera, CameraFault, ExposureKey, Frame, FrameBuffers, PixelRect, Sampling};
+use crate::camera::{Camera, CameraFault, ExposureKey, Frame, FrameBuffers, Sampling};
 use crate::faults::FaultList;
 use crate::worker_classifier::{CHANNEL, HeldImage};
 use crate::{NoiseKey, Scene};
@@ -43,7 +43,7 @@ pub struct CameraMount {
 impl CameraMount {
     /// Returns the mounting of a camera on an ego of this length (m).
     pub fn of(camera: &Camera, settings: ImageSettings, ego_length_m: f64) -> Self {
-        let sampling = Sampling::every(settings.step);
+        let sampling = Sampling::every(settings.step, camera.resolution);
         Self {
             x_m: -0.5 * ego_length_m + camera.mount_from_rear_m,
             z_m: camera.mount_height_m,
@@ -74,7 +74,7 @@ impl OutsideCamera {
         Self {
             camera,
             settings,
-            sampling: Sampling::every(settings.step),
+            sampling: Sampling::every(settings.step, camera.resolution),
             exposures: key.stream(CHANNEL),
             faults,
             held: None,
@@ -106,14 +106,14 @@ impl OutsideCamera {
         let held = self.held.as_ref().map(|held| (held.scene(), held.key));
         let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
         let lists = std::mem::take(&mut self.lists);
-        let mut frame = Frame::with_buffers(lists, &self.camera, imaged, key, &[PixelRect::IMAGE]);
+        let mut frame = Frame::with_buffers(lists, &self.camera, imaged, key, &[self.camera.resolution.image()]);
         if let Some(fault) = &fault {
             frame.add_glare(fault, imaged);
         }
         let mut picture = frame.sampled(self.sampling.columns(), self.sampling.rows()).image;
         self.lists = frame.into_buffers();
         if let Some(fault) = &fault {
-            fault.apply_to_picture(&mut picture, &self.sampling);
+            fault.apply_to_picture(&mut picture, &self.sampling, self.camera.resolution);
         }
         Some(OutsideImage { time: scene.time, width: picture.width, height: picture.height, rgb: picture.rgb })
     }

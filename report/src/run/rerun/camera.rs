@@ -2,7 +2,7 @@
 //! evaluates, or the instances of the Mask R-CNN.
 //!
 //! The closed loop never renders a whole camera image. This module renders it afterwards, from the
-//! same scene and the same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected
+//! same scene and the same noise. It renders every fifth pixel or so ([`Shown`]), and only at selected
 //! instants, since an image costs as much as a hundred control steps. An image and its marks stay
 //! visible until the next image. Faults of the camera do not appear in the images.
 //!
@@ -10,7 +10,7 @@
 //! every image of the Mask R-CNN is one that the network evaluated.
 
 use closecall_sensors::camera::{
-    Camera, ExposureKey, Frame as Exposure, FrameBuffers, Pipeline, PixelRect, RearCamera,
+    Camera, ExposureKey, Frame as Exposure, FrameBuffers, Pipeline, RearCamera, Resolution,
 };
 use closecall_sensors::rear_exposures;
 use closecall_traffic::{Time, VehicleClass, maths};
@@ -24,10 +24,11 @@ use crate::run::film::{Film, Frame};
 mod instances;
 mod windows;
 
-/// Distance between two rendered pixels, in both directions (px).
-const PIXEL_STEP: u16 = 5;
-/// Rendered rows of the image, from above the horizon down to the road just behind the ego (px).
-const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
+/// Number of columns that the shown picture has about, however many the image has.
+const SHOWN_COLUMNS: u16 = 256;
+/// Rendered rows above and below the middle of the usual image, from above the horizon down to the
+/// road just behind the ego (px).
+const ROWS_PX: [u32; 2] = [170, 210];
 /// Times before the critical moment for which an image is rendered, besides the first scan and the
 /// moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
@@ -41,6 +42,32 @@ pub(super) const ENTITY: &str = "world/ego/camera";
 /// hides no vehicle.
 const IMAGE_DISTANCE_M: f32 = 1.2;
 
+/// The part of the image that a recording shows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Shown {
+    /// Size of the image.
+    image: Resolution,
+    /// Distance between two rendered pixels, in both directions (px).
+    step_px: u16,
+    /// Rendered rows of the image (px).
+    rows_px: std::ops::Range<u16>,
+}
+
+impl Shown {
+    /// Returns the part that is shown of images of this size.
+    fn of(image: Resolution) -> Self {
+        let Resolution { width_px, height_px } = image;
+        let [above, below] = ROWS_PX.map(|rows| rows * u32::from(width_px) / u32::from(Resolution::USUAL.width_px));
+        let middle = u32::from(height_px) / 2;
+        let row = |at: u32| u16::try_from(at).map_or(height_px, |row| row.min(height_px));
+        Self {
+            image,
+            step_px: (width_px + SHOWN_COLUMNS / 2) / SHOWN_COLUMNS,
+            rows_px: row(middle.saturating_sub(above))..row(middle + below),
+        }
+    }
+}
+
 /// Writes position and projection of the camera, so that the scene shows its image where it is
 /// taken. The pitch of the body is left out.
 fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
@@ -50,9 +77,10 @@ fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<()
     let axes = [[0.0, 1.0, 0.0], [sin, 0.0, -cos], [-cos, 0.0, -sin]].map(|axis| axis.map(|value| value as f32));
     let position_m = [ahead_m as f32, 0.0, camera.mount_height_m as f32];
     writer.write_static(ENTITY, &Transform3D::from_translation_mat3x3(position_m, axes))?;
-    let (step, first_row) = (f32::from(PIXEL_STEP), f32::from(PIXEL_ROWS.start));
-    let rows = f32::from(PIXEL_ROWS.end) - first_row;
-    let [width, height] = [PixelRect::IMAGE.width as f32, PixelRect::IMAGE.height as f32];
+    let Shown { image, step_px, rows_px } = Shown::of(camera.resolution);
+    let (step, first_row) = (f32::from(step_px), f32::from(rows_px.start));
+    let rows = f32::from(rows_px.end) - first_row;
+    let [width, height] = [image.width_px, image.height_px].map(f32::from);
     let focal = camera.focal_px as f32 / step;
     let pinhole = Pinhole::from_focal_length_and_resolution([focal, focal], [width / step, rows / step])
         .with_principal_point([0.5 * width / step, (0.5 * height - first_row) / step])
@@ -84,7 +112,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingE
     let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
     writer.write_each(ENTITY, &images)?;
     if is_whole {
-        instances::write(writer, shown.iter().map(|row| &film.frames[*row]))?;
+        instances::write(writer, &Shown::of(camera.camera().resolution), shown.iter().map(|row| &film.frames[*row]))?;
     } else {
         marks.extend(shown.iter().map(|row| {
             let frame = &film.frames[*row];
@@ -140,8 +168,9 @@ fn render(
 ) -> (Image, FrameBuffers) {
     let (ego, others) = film.scene_vehicles(frame);
     let scene = film.scene(frame, ego, &others);
-    let mut exposure = Exposure::with_buffers(lists, camera.camera(), &scene, key, &[PixelRect::IMAGE]);
-    let picture = exposure.preview(PIXEL_STEP, PIXEL_ROWS);
+    let Shown { image, step_px, rows_px } = Shown::of(camera.camera().resolution);
+    let mut exposure = Exposure::with_buffers(lists, camera.camera(), &scene, key, &[image.image()]);
+    let picture = exposure.preview(step_px, rows_px);
     let image = Image::from_rgb24(picture.rgb, [picture.width, picture.height]);
     (image, exposure.into_buffers())
 }
@@ -151,10 +180,11 @@ fn render(
 ///
 /// A box that reaches beyond the picture is cut off: the viewer would make the picture smaller
 /// until the box fits.
-fn in_picture([left, top, right, bottom]: [f32; 4]) -> ([f32; 2], [f32; 2]) {
-    let scale = 1.0 / f32::from(PIXEL_STEP);
-    let first_row = f32::from(PIXEL_ROWS.start);
-    let size_px = [PixelRect::IMAGE.width as f32, f32::from(PIXEL_ROWS.end - PIXEL_ROWS.start)];
+fn in_picture(shown: &Shown, [left, top, right, bottom]: [f32; 4]) -> ([f32; 2], [f32; 2]) {
+    let Shown { image, step_px, rows_px } = shown;
+    let scale = 1.0 / f32::from(*step_px);
+    let first_row = f32::from(rows_px.start);
+    let size_px = [f32::from(image.width_px), f32::from(rows_px.end - rows_px.start)];
     let inside = |at: [f32; 2]| [0, 1].map(|axis| scale * at[axis].clamp(0.0, size_px[axis]));
     let (low, high) = (inside([left, top - first_row]), inside([right, bottom - first_row]));
     (low, [0, 1].map(|axis| high[axis] - low[axis]))
@@ -199,6 +229,30 @@ fn class_colour(class: VehicleClass) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_usual_image_is_shown_by_every_fifth_pixel() {
+        let usual = Shown::of(Resolution::USUAL);
+        assert_eq!((usual.step_px, usual.rows_px), (5, 230..610));
+    }
+
+    #[test]
+    fn a_box_lies_at_the_same_place_of_the_picture_whatever_the_size_of_the_image() {
+        let fine = Shown::of(Resolution { width_px: 2_560, height_px: 1_600 });
+        let place = in_picture(&Shown::of(Resolution::USUAL), [600.0, 400.0, 700.0, 480.0]);
+        assert_eq!(in_picture(&fine, [1_200.0, 800.0, 1_400.0, 960.0]), place);
+    }
+
+    #[test]
+    fn an_image_with_few_rows_is_shown_whole() {
+        for (width_px, height_px) in [(640, 480), (3_848, 480), (3_848, 2_168), (641, 2_168)] {
+            let Shown { step_px, rows_px, .. } = Shown::of(Resolution { width_px, height_px });
+            let columns = width_px / step_px;
+            assert!((200..300).contains(&columns), "{columns} columns of {width_px}");
+            assert!(rows_px.start < height_px / 2 && height_px / 2 < rows_px.end && rows_px.end <= height_px);
+        }
+        assert_eq!(Shown::of(Resolution { width_px: 3_848, height_px: 480 }).rows_px, 0..480);
+    }
 
     #[test]
     fn no_label_lies_on_that_of_a_larger_box() {

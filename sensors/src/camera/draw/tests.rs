@@ -31,7 +31,7 @@ fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize;
         vehicle(VehicleClass::Motorcycle, [712.0, -1.9]),
     ];
     let scene = Scene { time: Time::from_ms(1_400), road, environment, ego, others: &others };
-    let mut frame = Frame::new(&camera, &scene, ExposureKey(3), &[PixelRect::IMAGE]);
+    let mut frame = Frame::new(&camera, &scene, ExposureKey(3), &[camera.resolution.image()]);
     let columns: Vec<i32> = (0..1280).step_by(9).collect();
     let effects = Effects {
         patches: frame.lists.patches.clone(),

@@ -1,9 +1,9 @@
 //! The instances that the Mask R-CNN found in an image: boxes with class and score, and masks.
 
-use closecall_sensors::camera::{Instance, MASK_THRESHOLD, PixelRect};
+use closecall_sensors::camera::{Instance, MASK_THRESHOLD};
 use closecall_traffic::{Time, VehicleClass};
 
-use super::{ENTITY, PIXEL_ROWS, PIXEL_STEP, class_colour, clear_covered, fixed_marks, in_picture};
+use super::{ENTITY, Shown, class_colour, clear_covered, fixed_marks, in_picture};
 use crate::run::film::Frame;
 use crate::run::rerun::RecordingError;
 use crate::run::rerun::palette::{self, Rgba};
@@ -37,12 +37,16 @@ pub(super) fn write_fixed(writer: &Writer<'_>) -> Result<(), RecordingError> {
 }
 
 /// Writes the instances of the images that were taken in these frames.
-pub(super) fn write<'a>(writer: &Writer<'_>, frames: impl Iterator<Item = &'a Frame>) -> Result<(), RecordingError> {
+pub(super) fn write<'a>(
+    writer: &Writer<'_>,
+    part: &Shown,
+    frames: impl Iterator<Item = &'a Frame>,
+) -> Result<(), RecordingError> {
     let images: Vec<(Time, &[Instance])> =
         frames.filter_map(|frame| frame.rear_image.as_ref().map(|image| (frame.time, &image.instances[..]))).collect();
-    let boxes: Vec<(Time, Boxes2D)> = images.iter().map(|(time, instances)| (*time, boxes(instances))).collect();
+    let boxes: Vec<(Time, Boxes2D)> = images.iter().map(|(time, instances)| (*time, boxes(part, instances))).collect();
     let masks: Vec<(Time, SegmentationImage)> =
-        images.iter().map(|(time, instances)| (*time, masks(instances))).collect();
+        images.iter().map(|(time, instances)| (*time, masks(part, instances))).collect();
     writer.write_each(&boxes_entity(), &rows(&boxes))?;
     writer.write_each(&masks_entity(), &rows(&masks))
 }
@@ -52,8 +56,8 @@ fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> 
 }
 
 /// Returns the boxes of the instances with class and score, cut to the shown picture.
-fn boxes(instances: &[Instance]) -> Boxes2D {
-    let ends = |instance: &Instance| in_picture(instance.box_px.map(|side| side as f32));
+fn boxes(part: &Shown, instances: &[Instance]) -> Boxes2D {
+    let ends = |instance: &Instance| in_picture(part, instance.box_px.map(|side| side as f32));
     let is_shown = |instance: &&Instance| ends(instance).1.iter().all(|side| *side > 0.0);
     let shown: Vec<&Instance> = instances.iter().filter(is_shown).collect();
     let colour = |instance: &&Instance| match instance.score >= LIKELY {
@@ -80,13 +84,13 @@ fn label(instance: &Instance) -> String {
 
 /// Returns the class of each pixel of the shown picture: the class of the likeliest instance whose
 /// mask covers it, or 0.
-fn masks(instances: &[Instance]) -> SegmentationImage {
+fn masks(part: &Shown, instances: &[Instance]) -> SegmentationImage {
     let mut likely: Vec<&Instance> = instances.iter().filter(|instance| instance.score >= LIKELY).collect();
     likely.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let step = usize::from(PIXEL_STEP);
-    let middle = |pixel: u32| f64::from(pixel) + 0.5 * f64::from(PIXEL_STEP);
-    let columns = (0..PixelRect::IMAGE.width).step_by(step).map(middle);
-    let rows = PIXEL_ROWS.step_by(step).map(|row| middle(row.into()));
+    let step = usize::from(part.step_px);
+    let middle = |pixel: u32| f64::from(pixel) + 0.5 * f64::from(part.step_px);
+    let columns = (0..u32::from(part.image.width_px)).step_by(step).map(middle);
+    let rows = part.rows_px.clone().step_by(step).map(|row| middle(row.into()));
     let class_at = |at: [f64; 2]| {
         let covers = |instance: &&&Instance| instance.mask.at(at) >= MASK_THRESHOLD;
         likely.iter().find(covers).map_or(0, |instance| mask_class(instance.class))

@@ -4,7 +4,7 @@
 use closecall_sensors::Detection;
 use closecall_sensors::camera::{PixelRect, RearCamera};
 
-use super::{class_colour, clear_covered, in_picture};
+use super::{Shown, class_colour, clear_covered, in_picture};
 use crate::run::film::{Film, Frame};
 use crate::run::rerun::palette::{self, Rgba};
 use rerun::Boxes2D;
@@ -15,9 +15,10 @@ pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
         boxes.iter().filter_map(|detection| Some((detection, camera.detection_window(&ego, detection)?))).collect();
+    let part = Shown::of(camera.camera().resolution);
     let ends = |window: &PixelRect| {
         let [left, top] = [window.left, window.top].map(|start| start as f32);
-        in_picture([left, top, left + window.width as f32, top + window.height as f32])
+        in_picture(&part, [left, top, left + window.width as f32, top + window.height as f32])
     };
     let shown: Vec<([f32; 2], [f32; 2])> = in_image.iter().map(|(_, window)| ends(window)).collect();
     let mut labels: Vec<String> = in_image.iter().map(|(detection, _)| label(detection)).collect();
