@@ -147,8 +147,8 @@ fn is_hidden(index: usize, detection_px: &[f64; 4], detections: &[Detection], bo
 /// Returns the width of a vehicle from its mask (m), if the image does not cut it off and the width
 /// is plausible.
 ///
-/// The outer edge of the mask is the edge of the front face. The inner edge, towards the middle of
-/// the image, is the edge of the rear if the side between them is seen.
+/// The outer edge of the mask is the edge of the front face. The inner edge, towards the place
+/// straight behind, is the edge of the rear if the side between them is seen.
 fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detection: &Detection) -> Option<f64> {
     let [left, _, right, _] = instance.mask.extent_px()?;
     let width_px = f64::from(camera.camera().resolution.width_px);
@@ -156,9 +156,8 @@ fn width_m(camera: &RearCamera, ego: &SceneVehicle, instance: &Instance, detecti
         return None;
     }
     let depth_m = camera.depth_m(ego, detection.face_x_m)?;
-    let middle = 0.5 * width_px;
-    // Rays to the right of the middle of the image have positive slopes, to the ego's left.
-    let [low, high] = [left, right].map(|edge| (edge - middle) / camera.camera().focal_px);
+    // Rays to the ego's left have positive slopes.
+    let [low, high] = [left, right].map(|edge| camera.slope(edge));
     let at = |slope: f64, is_inner: bool| slope * if is_inner { depth_m + detection.length_m } else { depth_m };
     let width_m = at(high, high < 0.0) - at(low, low > 0.0);
     WIDTHS_M.contains(&width_m).then_some(width_m)
@@ -175,7 +174,8 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
     let depth_m = camera.depth_m(&scene.ego, x_m).filter(|depth_m| *depth_m <= MAX_ALONE_M)?;
     let typical = instance.class.typical_dimensions();
     let focal_px = camera.camera().focal_px;
-    let width_m = (right - left) / focal_px * depth_m;
+    let widening = camera.widening([left, right]);
+    let width_m = (right - left) / focal_px * widening * depth_m;
     // The distance is h / tan β: its derivative by β is −h / sin² β, which is about d / tan β.
     let range_sd_m = depth_m / below * maths::hypot(ROW_SD_PX / focal_px, PITCH_SD_RAD);
     let mut scores = [0.0; 4];
@@ -185,7 +185,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         face_x_m: x_m,
         face_y_m: y_m,
         range_sd_m,
-        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / focal_px, y_m / depth_m * range_sd_m),
+        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / focal_px * widening, y_m / depth_m * range_sd_m),
         heading_rad: lane.direction_rad(x_m),
         length_m: typical.length_m,
         length: Extent::Assumed,

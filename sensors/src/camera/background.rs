@@ -27,7 +27,8 @@ pub(super) enum Background {
         depth_m: f32x4,
         nearness: f32,
     },
-    /// The sky and the woods, seen in directions with these parts ahead and up, by moment.
+    /// The sky and the woods, seen in directions with these parts against the camera's axis and up,
+    /// by moment.
     Sky { ahead: f32x4, up: f32x4 },
 }
 
@@ -45,11 +46,15 @@ impl Background {
         let height_m = frame.lens.height_m as f32;
         let is_ground =
             |[ahead, left, up]: [f32; 3]| up / (ahead * ahead + left * left).sqrt() * GROUND_TO_M < -height_m;
-        let ray = |moment: usize, x: f32| frame.lens.ray_in_ground([x, y[moment]]);
+        let ray = |moment: usize, x: f32| frame.lens.ray_in_level_axes([x, y[moment]]);
         // Rounding is monotone: the outermost sample has the smallest slope, and a sample in the
         // middle the largest. If the outermost sample meets the ground, all samples meet it. If the
         // middle sample does not, no sample does.
         if (0..MOMENTS).all(|moment| is_ground(ray(moment, widest[moment]))) {
+            if frame.lens.is_turned() {
+                // The points of a row do not lie at one distance behind the ego.
+                return Self::Mixed;
+            }
             let [ahead, _, up] = lanes(|moment| ray(moment, 0.0));
             let depth_m: [f32; MOMENTS] = std::array::from_fn(|moment| -height_m / up[moment]);
             let x = std::array::from_fn(|moment| ahead[moment] * depth_m[moment]);
@@ -91,7 +96,7 @@ impl Frame {
             }
             Background::Sky { ahead, up } => {
                 let slope = *up / (*ahead * *ahead + x * x).sqrt();
-                let bearing = -x / *ahead + f32x4::splat(self.ego_yaw_rad);
+                let bearing = -x / *ahead + f32x4::splat(self.bearing_rad);
                 Some((mean(radiances(slope, bearing, &self.light, &mut noise.sky)?), 0.0))
             }
         }

@@ -11,11 +11,18 @@ use crate::kept::kept;
 
 /// Horizontal field of view of the usual camera (deg), with which the networks were trained.
 const FIELD_OF_VIEW_DEG: f64 = 60.0;
+/// Largest angle from straight behind at which the image ends (deg): what stands beside the ego is
+/// rendered behind the lens only.
+const WIDEST_DEG: f64 = 85.0;
 /// Difference from it that is due to rounding (deg).
 const ROUNDING_DEG: f64 = 1e-9;
 
 fn is_usual_field(number: &Num) -> bool {
     *number == Num::Fixed(FIELD_OF_VIEW_DEG)
+}
+
+fn is_straight_back(number: &Num) -> bool {
+    *number == Num::Fixed(0.0)
 }
 
 fn is_usual_resolution(resolution: &ResolutionConfig) -> bool {
@@ -72,6 +79,11 @@ pub struct CameraConfig {
     pub mount_from_rear_m: Num,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: Num,
+    /// Yaw of the camera's axis from straight behind (deg), positive if it looks to the ego's left. All
+    /// columns of the image look backward, at most 85° from straight behind: with a field of view of
+    /// 60°, the yaw is -55 to 55. Default: 0.
+    #[serde(skip_serializing_if = "is_straight_back")]
+    pub yaw_deg: Num,
     /// Horizontal field of view (deg) of all columns of the image. The networks that ship were
     /// trained with 60°. Default: 60.
     #[serde(skip_serializing_if = "is_usual_field")]
@@ -110,6 +122,7 @@ impl Default for CameraConfig {
             mount_height_m: Num::Fixed(1.2),
             mount_from_rear_m: Num::Fixed(0.6),
             pitch_rad: Num::Fixed(0.03),
+            yaw_deg: Num::Fixed(0.0),
             field_of_view_deg: Num::Fixed(FIELD_OF_VIEW_DEG),
             resolution: ResolutionConfig::default(),
             vibration_radps: Num::Fixed(0.05),
@@ -147,6 +160,8 @@ pub struct Camera {
     pub mount_from_rear_m: f64,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: f64,
+    /// Yaw of the optical axis from straight behind, positive if it looks to the ego's left (rad).
+    pub yaw_rad: f64,
     /// Horizontal field of view (rad).
     pub field_of_view_rad: f64,
     /// Size of the image.
@@ -190,6 +205,8 @@ impl Check for CameraConfig {
                 (field_rad, f64::from(resolution.width_px) / 2.0 / maths::tan(field_rad / 2.0))
             }
         };
+        let widest_deg = WIDEST_DEG - 0.5 * field_deg;
+        let yaw_deg = number(&self.yaw_deg, "yaw-deg", -widest_deg, widest_deg)?;
         let pipeline = parameters.word(&self.pipeline, "pipeline")?;
         if pipeline == Pipeline::MaskRcnn && resolution != Resolution::USUAL {
             let Resolution { width_px, height_px } = Resolution::USUAL;
@@ -203,6 +220,7 @@ impl Check for CameraConfig {
             mount_height_m: number(&self.mount_height_m, "mount-height-m", 0.4, 3.5)?,
             mount_from_rear_m: number(&self.mount_from_rear_m, "mount-from-rear-m", 0.0, 3.0)?,
             pitch_rad: number(&self.pitch_rad, "pitch-rad", -0.2, 0.3)?,
+            yaw_rad: yaw_deg.to_radians(),
             field_of_view_rad,
             resolution,
             focal_px,
@@ -236,6 +254,24 @@ mod tests {
         let sun = SunConfig { elevation_rad: Num::Fixed(2.0), ..SunConfig::default() };
         let error = CameraConfig { sun, ..CameraConfig::default() }.check(&Parameters::default()).unwrap_err();
         assert!(error.to_string().starts_with("`sun.elevation-rad` is 2"), "{error}");
+    }
+
+    #[test]
+    fn a_yaw_at_which_the_image_would_not_look_backward_is_refused_with_the_allowed_range() {
+        let check = |text: &str| toml::from_str::<CameraConfig>(text).unwrap().check(&Parameters::default());
+        let refused = |text: &str| check(text).unwrap_err().to_string();
+        assert_eq!(refused("yaw-deg = 56"), "`yaw-deg` is 56, but a number from -55 to 55 is needed");
+        assert_eq!(refused("yaw-deg = -180"), "`yaw-deg` is -180, but a number from -55 to 55 is needed");
+        // A wider image has less room to turn.
+        let wide = "field-of-view-deg = 120\nyaw-deg = 26";
+        assert_eq!(refused(wide), "`yaw-deg` is 26, but a number from -25 to 25 is needed");
+        let narrow = check("field-of-view-deg = 20\nyaw-deg = -75").unwrap();
+        assert!((narrow.yaw_rad.to_degrees() + 75.0).abs() < 1e-12);
+        assert!(check("yaw-deg = nan").is_err());
+        assert!(
+            !serde_json::to_string(&CameraConfig::default()).unwrap().contains("yaw"),
+            "the default is not written"
+        );
     }
 
     #[test]

@@ -259,19 +259,21 @@ impl Frame {
             let radiance = self.of_face(self.lists.visibility.face[sample][moment], (place, moment), depth, line);
             return (self.through_air(radiance, depth * length), inverse_depth);
         }
-        let direction = self.lens.ray_in_ground(line.ray(self, place, moment));
+        let ray = line.ray(self, place, moment);
+        let [ahead, left, up] = self.lens.ray_in_level_axes(ray);
         let height = self.lens.height_m as f32;
-        let slope = || direction[2] / (direction[0] * direction[0] + direction[1] * direction[1]).sqrt();
+        let slope = || up / (ahead * ahead + left * left).sqrt();
         if line.is_ground[moment] || slope() * GROUND_TO_M < -height {
-            let depth = if line.is_ground[moment] { line.ground_depth_m[moment] } else { -height / direction[2] };
-            let at = [direction[0] * depth, direction[1] * depth];
+            let depth = if line.is_ground[moment] { line.ground_depth_m[moment] } else { -height / up };
+            let [x, y, _] = self.lens.ray_in_ground(ray);
+            let at = [x * depth, y * depth];
             let lit =
                 GroundLight { light: &self.light, patches: &line.effects.patches, left_px: line.columns[place] as f32 };
             let noise = &mut line.noise[moment].0;
             let radiance = self.ground.radiance(at, line.travelled_m[moment], &lit, noise);
             return (self.through_air(radiance, depth * length), 1.0 / depth);
         }
-        let bearing = -direction[1] / direction[0] + self.ego_yaw_rad;
+        let bearing = -left / ahead + self.bearing_rad;
         (sky::radiance(slope(), bearing, &self.light, &mut line.noise[moment].1), 0.0)
     }
 

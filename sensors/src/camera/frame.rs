@@ -68,8 +68,9 @@ pub struct Frame {
     pub(super) travelled_m: [f32; MOMENTS],
     /// Speed of the ego (m/s).
     pub(super) ego_speed_mps: f64,
-    /// Yaw of the ego in the plane (rad).
-    pub(super) ego_yaw_rad: f32,
+    /// Yaw of the ego in the plane plus the yaw of the camera (rad), from which the textures of woods
+    /// and clouds count.
+    pub(super) bearing_rad: f32,
     pub(super) lists: FrameBuffers,
 }
 
@@ -148,7 +149,7 @@ impl Frame {
             travelled_m: [0, 1, 2, 3].map(|moment| (ego.speed_mps * moment_offset(moment)) as f32 * light.exposure_s),
             light,
             ego_speed_mps: ego.speed_mps,
-            ego_yaw_rad: yaw as f32,
+            bearing_rad: (yaw + camera.yaw_rad) as f32,
             lists,
         };
         for (index, vehicle) in scene.others.iter().enumerate() {

@@ -103,7 +103,7 @@ impl<'a> Line<'a> {
         for moment in 0..MOMENTS {
             // Rounding is monotone, so that the outermost sample has the smallest slope: if it
             // meets the ground, all do.
-            let [ahead, left, up] = frame.lens.ray_in_ground([self.widest[moment], self.y[moment]]);
+            let [ahead, left, up] = frame.lens.ray_in_level_axes([self.widest[moment], self.y[moment]]);
             let slope = up / (ahead * ahead + left * left).sqrt();
             self.is_ground[moment] = slope * GROUND_TO_M < -height;
             self.ground_depth_m[moment] = -height / up;

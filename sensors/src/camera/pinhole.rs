@@ -8,6 +8,9 @@
 //!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
 //! ```
 //!
+//! A yaw turns the axis about the vertical, from −x towards +y if it is positive, as a rear LiDAR's
+//! azimuth does: what lies straight behind moves to the left of the image.
+//!
 //! The camera axes follow the convention of computer vision: x right, y down, z along the optical
 //! axis (the *depth*). Pixels are square. Unless the lens is configured otherwise ([`Optics`]), it
 //! has no distortion.
@@ -77,7 +80,7 @@ impl GroundBox {
     }
 }
 
-/// The lens at one instant: its position in the ego vehicle and its pitch.
+/// The lens at one instant: its position in the ego vehicle, its yaw and its pitch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lens {
     /// Focal length (px).
@@ -95,6 +98,8 @@ pub(crate) struct Lens {
     pub(crate) sin_pitch: f64,
     /// Cosine of the downward pitch of the optical axis.
     pub(crate) cos_pitch: f64,
+    /// Cosine and sine of the yaw of the optical axis from straight behind, positive to the left.
+    yaw: [f64; 2],
     /// How the lens differs from a pinhole.
     pub(crate) optics: Optics,
     /// Time between the readings of the first and of the last row of the image (s).
@@ -106,8 +111,10 @@ impl Lens {
     pub(crate) fn new(camera: &Camera, ego: &SceneVehicle) -> Self {
         let ahead_m = camera.mount_from_rear_m - ego.vehicle.dimensions.length_m / 2.0;
         // If the nose of the ego dips, its tail rises: the lens moves up and its axis points
-        // higher.
-        let pitch = camera.pitch_rad - ego.pitch_rad;
+        // higher. A turned camera pitches by a part of the angle; its roll by the other part, at most
+        // a degree, is neglected.
+        let (sin_yaw, cos_yaw) = maths::sin_cos(camera.yaw_rad);
+        let pitch = camera.pitch_rad - cos_yaw * ego.pitch_rad;
         Self {
             focal_px: f64::from(camera.resolution.width_px) / 2.0 / maths::tan(camera.field_of_view_rad / 2.0),
             stated_focal_px: camera.focal_px,
@@ -116,22 +123,48 @@ impl Lens {
             height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
             sin_pitch: maths::sin(pitch),
             cos_pitch: maths::cos(pitch),
+            yaw: [cos_yaw, sin_yaw],
             optics: camera.optics,
             readout_s: camera.readout_s,
         }
     }
 
+    /// Returns whether the optical axis does not point straight behind.
+    pub(crate) fn is_turned(&self) -> bool {
+        self.yaw[1] != 0.0
+    }
+
+    /// Rotates a horizontal vector from the ground frame to the level axes of the lens, which are the
+    /// axes of the ground frame turned by the yaw.
+    fn in_level_axes(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        if !self.is_turned() {
+            return [x, y];
+        }
+        let [cos, sin] = self.yaw;
+        [cos * x - sin * y, sin * x + cos * y]
+    }
+
     /// Converts a point from the ground frame to camera axes (m).
     pub(crate) fn in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        let (s, c) = (self.sin_pitch, self.cos_pitch);
-        let up = z - self.height_m;
-        [y, s * x - c * up, -c * x - s * up]
+        self.direction_in_camera([x, y, z - self.height_m])
+    }
+
+    /// Rotates the ray (x, y, 1), given in camera axes, into the level axes of the lens.
+    #[inline]
+    pub(crate) fn ray_in_level_axes(&self, [x, y]: [f32; 2]) -> [f32; 3] {
+        let (s, c) = (self.sin_pitch as f32, self.cos_pitch as f32);
+        [s * y - c, x, -c * y - s]
     }
 
     /// Rotates the ray (x, y, 1), given in camera axes, into the ground frame.
-    pub(crate) fn ray_in_ground(&self, [x, y]: [f32; 2]) -> [f32; 3] {
-        let (s, c) = (self.sin_pitch as f32, self.cos_pitch as f32);
-        [s * y - c, x, -c * y - s]
+    #[inline]
+    pub(crate) fn ray_in_ground(&self, ray: [f32; 2]) -> [f32; 3] {
+        let [ahead, left, up] = self.ray_in_level_axes(ray);
+        if !self.is_turned() {
+            return [ahead, left, up];
+        }
+        let [cos, sin] = self.yaw.map(|part| part as f32);
+        [cos * ahead + sin * left, cos * left - sin * ahead, up]
     }
 
     /// Projects a point in camera axes to the image (px). The point must lie in front of the lens.
@@ -166,6 +199,7 @@ impl Lens {
     /// Rotates a direction from the ground frame into camera axes.
     pub(crate) fn direction_in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (s, c) = (self.sin_pitch, self.cos_pitch);
+        let [x, y] = self.in_level_axes([x, y]);
         [y, s * x - c * z, -c * x - s * z]
     }
 
@@ -305,13 +339,68 @@ mod tests {
         assert!(at(lens(0.02)) > at(lens(0.0)));
     }
 
+    fn turned(yaw_deg: f64, pitch_rad: f64) -> Lens {
+        use closecall_traffic::Num;
+        let [yaw_deg, pitch_rad] = [yaw_deg, pitch_rad].map(Num::Fixed);
+        lens_of(&CameraConfig { yaw_deg, pitch_rad, ..CameraConfig::default() }, 0.0)
+    }
+
     #[test]
     fn a_ray_rotated_into_the_ground_frame_and_back_is_unchanged() {
-        let lens = lens(0.01);
-        let ray = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
-        let from_lens = [ray[0], ray[1], ray[2] + lens.height_m];
-        for (got, wanted) in lens.in_camera(from_lens).iter().zip([0.3, -0.2, 1.0]) {
-            assert!((got - wanted).abs() < 1e-6);
+        for lens in [lens(0.01), turned(37.0, 0.1), turned(-55.0, -0.2)] {
+            let ray = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
+            let from_lens = [ray[0], ray[1], ray[2] + lens.height_m];
+            for (got, wanted) in lens.in_camera(from_lens).iter().zip([0.3, -0.2, 1.0]) {
+                assert!((got - wanted).abs() < 1e-6);
+            }
+        }
+    }
+
+    /// A level camera maps an azimuth to a column and, for each azimuth, a height to a row.
+    #[test]
+    fn a_turned_camera_shows_a_point_where_the_closed_form_says() {
+        for yaw_deg in [-50.0, -20.0, -0.5, 0.0, 10.0, 35.0, 55.0_f64] {
+            let lens = turned(yaw_deg, 0.0);
+            for off_axis_deg in [-29.0, -12.0, 0.0, 3.0, 30.0_f64] {
+                for (distance_m, height_m) in [(4.0, 0.0), (25.0, 1.2), (90.0, 3.0)] {
+                    let (sin, cos) = maths::sin_cos((yaw_deg + off_axis_deg).to_radians());
+                    // The azimuth counts from straight behind to the ego's left.
+                    let [u, v] = lens.pixel(lens.in_camera([-distance_m * cos, distance_m * sin, height_m]));
+                    let off_axis = off_axis_deg.to_radians();
+                    let wanted_u = 640.0 + FOCAL_PX * maths::tan(off_axis);
+                    let wanted_v = 400.0 + FOCAL_PX * (1.2 - height_m) / (distance_m * maths::cos(off_axis));
+                    assert!((u - wanted_u).abs() < 1e-6, "column {u}, not {wanted_u}, at {yaw_deg}°");
+                    assert!((v - wanted_v).abs() < 1e-6, "row {v}, not {wanted_v}, at {yaw_deg}°");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_turned_to_the_left_shows_what_is_straight_behind_on_the_left_of_the_image() {
+        let [left, right] = [20.0, -20.0].map(|yaw_deg| turned(yaw_deg, 0.03));
+        let column = |lens: Lens| lens.pixel(lens.in_camera([-30.0, 0.0, 1.0]))[0];
+        assert!(column(left) < 300.0 && column(right) > 980.0, "{} and {}", column(left), column(right));
+        // The axis of a camera that looks down meets the road at height / tan(pitch).
+        for yaw_deg in [-50.0, 0.0, 33.0_f64] {
+            let lens = turned(yaw_deg, 0.1);
+            let (sin, cos) = maths::sin_cos(yaw_deg.to_radians());
+            let distance_m = lens.height_m / maths::tan(0.1);
+            let [u, v] = lens.pixel(lens.in_camera([-distance_m * cos, distance_m * sin, 0.0]));
+            assert!((u - 640.0).abs() < 1e-6 && (v - 400.0).abs() < 1e-6, "{u}, {v}");
+        }
+    }
+
+    #[test]
+    fn the_mirrored_camera_shows_the_mirrored_point_in_the_mirrored_column() {
+        for yaw_deg in [0.0, 12.0, 47.0] {
+            for point in [[-8.0, 2.0, 0.0], [-30.0, -3.75, 1.4], [-3.0, 3.0, 0.5]] {
+                let [x, y, z] = point;
+                let [u, v] = turned(yaw_deg, 0.05).pixel(turned(yaw_deg, 0.05).in_camera(point));
+                let image = turned(-yaw_deg, 0.05);
+                let [mirrored_u, mirrored_v] = image.pixel(image.in_camera([x, -y, z]));
+                assert!((u + mirrored_u - 1_280.0).abs() < 1e-9 && (v - mirrored_v).abs() < 1e-9);
+            }
         }
     }
 

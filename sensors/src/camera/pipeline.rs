@@ -166,10 +166,10 @@ pub fn fuse(shape: &ClassScores, image: &ClassScores) -> ClassScores {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{Check, Environment, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+    use closecall_traffic::{Check, Environment, Num, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
 
     use super::*;
-    use crate::camera::CameraConfig;
+    use crate::camera::{CameraConfig, ResolutionConfig};
     use crate::tracking::{Extent, SeenBy, SeenPart};
 
     fn vehicle(class: VehicleClass, s_m: f64) -> SceneVehicle {
@@ -199,7 +199,11 @@ mod tests {
     }
 
     fn classify(others: &[SceneVehicle], detections: &mut [Detection]) -> usize {
-        let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+        classify_by(&CameraConfig::default(), others, detections)
+    }
+
+    fn classify_by(config: &CameraConfig, others: &[SceneVehicle], detections: &mut [Detection]) -> usize {
+        let camera = config.check(&Parameters::default()).unwrap();
         let (road, environment, ego) = (Road::straight(3), Environment::CLEAR_DAY, vehicle(VehicleClass::Car, 500.0));
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others };
         let mut pipeline = CropClassifier::new(camera, &Backend::Tract).unwrap();
@@ -236,6 +240,32 @@ mod tests {
         let mut detections = [detection(30.0, 1.8, 1.5)];
         assert_eq!(classify(&[], &mut detections), 0);
         assert_eq!(detections[0].class, ClassScores::UNKNOWN);
+    }
+
+    #[test]
+    fn a_vehicle_that_leaves_the_image_of_a_turned_camera_is_not_classified() {
+        // The ego's left is at positive y. The image ends 30° from the axis.
+        let (behind, on_the_left) = ((-41.0, 0.0), (-9.0, 3.7));
+        let count = |yaw_deg: f64, (face_x_m, face_y_m): (f64, f64)| {
+            let config = CameraConfig { yaw_deg: Num::Fixed(yaw_deg), ..CameraConfig::default() };
+            let mut detections = [Detection { face_y_m, ..detection(face_x_m, 1.8, 1.5) }];
+            let count = classify_by(&config, &[], &mut detections);
+            assert_eq!(detections[0].class == ClassScores::UNKNOWN, count == 0);
+            count
+        };
+        assert_eq!([-40.0, -20.0, 0.0, 20.0, 40.0].map(|yaw_deg| count(yaw_deg, behind)), [0, 1, 1, 1, 0]);
+        assert_eq!([-30.0, 30.0, 45.0].map(|yaw_deg| count(yaw_deg, on_the_left)), [0, 1, 1]);
+    }
+
+    #[test]
+    fn an_image_with_few_rows_ends_above_a_near_vehicle() {
+        // The road 2.3 m behind the lens lies 580 px below the middle of the image.
+        let count = |height_px: u64| {
+            let resolution = ResolutionConfig { height_px, ..ResolutionConfig::default() };
+            let config = CameraConfig { resolution, ..CameraConfig::default() };
+            classify_by(&config, &[], &mut [detection(-4.0, 1.8, 1.0)])
+        };
+        assert_eq!([count(1_600), count(480)], [1, 0]);
     }
 
     #[test]

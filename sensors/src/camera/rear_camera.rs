@@ -233,6 +233,78 @@ mod tests {
         assert!(differ.count() < 2_000);
     }
 
+    fn with_yaw(yaw_deg: f64) -> RearCamera {
+        camera_with(|config| config.yaw_deg = Num::Fixed(yaw_deg))
+    }
+
+    #[test]
+    fn a_crop_of_a_turned_camera_has_the_bits_of_the_whole_image() {
+        let square = |left, top, side| PixelRect { left, top, width: side, height: side };
+        let windows = [square(600, 380, 32), square(100, 300, 301), square(900, 395, 64), square(-40, 700, 200)];
+        for yaw_deg in [-35.0, 20.0] {
+            let distorted = camera_with(|config| {
+                config.yaw_deg = Num::Fixed(yaw_deg);
+                config.lens.distortion_k1 = Num::Fixed(-0.3);
+                config.readout_s = Num::Fixed(0.03);
+            });
+            for light in [Light::Day, Light::Night] {
+                assert_crops_match(&with_yaw(yaw_deg), light, &windows);
+                assert_crops_match(&distorted, light, &windows);
+            }
+        }
+    }
+
+    #[test]
+    fn the_projected_window_of_a_vehicle_shows_it_to_a_turned_camera() {
+        let (_, environment, others) = varied_scene(Light::Day);
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let road = Road::straight(3);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        for yaw_deg in [-15.0, 15.0] {
+            let camera = with_yaw(yaw_deg);
+            for (index, other) in others.iter().enumerate() {
+                let window = camera.project(&ego, &box_of(&ego, other)).unwrap();
+                let straight = rear_camera().project(&ego, &box_of(&ego, other)).unwrap();
+                let moved = f64::from(straight.left - window.left) / yaw_deg;
+                assert!(moved > 10.0, "a camera that looks to the left shows it farther to the left: {moved}");
+                let mut frame = Frame::new(camera.camera(), &scene, ExposureKey(1), &[window]);
+                frame.crop(window, &mut Crop::default());
+                let share = frame.instance_share(index);
+                assert!((0.1..0.9).contains(&share), "{:?}: {share}", other.vehicle.class);
+            }
+        }
+    }
+
+    #[test]
+    fn the_mirrored_camera_sees_the_mirror_image_of_the_mirrored_world() {
+        let (_, environment, others) = varied_scene(Light::Day);
+        let environment = Environment { rain_mm_per_h: 0.0, water_film_mm: 0.0, ..environment };
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let road = Road::straight(3);
+        let mirror = |other: &SceneVehicle| SceneVehicle {
+            state: VehicleState { d_m: road.right_edge_m() - other.state.d_m, ..other.state },
+            ..*other
+        };
+        let seen = |camera: RearCamera, road: &Road, ego: SceneVehicle, others: &[SceneVehicle]| {
+            let scene = Scene { time: Time::ZERO, road, environment: &environment, ego, others };
+            camera.render_image(&scene, ExposureKey(3)).instances
+        };
+        let original = seen(with_yaw(15.0), &road, ego, &others);
+        let mirrored_road = road.mirrored().unwrap();
+        let mirrored_others: Vec<SceneVehicle> = others.iter().map(mirror).collect();
+        let differences = |yaw_deg: f64| {
+            let image = seen(with_yaw(yaw_deg), &mirrored_road, mirror(&ego), &mirrored_others);
+            let rows = original.chunks_exact(1_280).zip(image.chunks_exact(1_280));
+            rows.flat_map(|(one, other)| one.iter().zip(other.iter().rev())).filter(|(one, other)| one != other).count()
+        };
+        let shown = original.iter().filter(|instance| **instance > 0).count();
+        assert!(shown > 3_000, "{shown} pixels show vehicles");
+        // The samples of a pixel do not lie in its middle: edges may differ by a pixel.
+        let mirrored = differences(-15.0);
+        assert!(mirrored * 5 < shown, "{mirrored} of {shown} pixels differ");
+        assert!(differences(15.0) > shown, "a camera that is not mirrored shows something else");
+    }
+
     #[test]
     fn the_window_of_a_vehicle_has_twice_the_side_in_twice_the_pixels() {
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);

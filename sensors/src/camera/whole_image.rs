@@ -123,6 +123,27 @@ impl RearCamera {
         (depth_m > 0.0).then_some(depth_m)
     }
 
+    /// Returns the distance to the ego's left of the ray through a column of the image (px), per
+    /// distance behind the lens. The pitch is neglected.
+    pub fn slope(&self, u: f64) -> f64 {
+        let (slope, turn) = (self.slope_to_axis(u), maths::tan(self.camera().yaw_rad));
+        (slope + turn) / (1.0 - slope * turn)
+    }
+
+    /// Returns the distance across the optical axis of the ray through a column, per distance along
+    /// the axis.
+    fn slope_to_axis(&self, u: f64) -> f64 {
+        (u - self.camera().resolution.middle_px()[0]) / self.camera().focal_px
+    }
+
+    /// Returns the distance between the slopes of two columns, divided by the distance of the columns
+    /// in units of the focal length: 1 if the camera looks straight back.
+    pub fn widening(&self, columns: [f64; 2]) -> f64 {
+        let turn = maths::tan(self.camera().yaw_rad);
+        let [left, right] = columns.map(|u| 1.0 - self.slope_to_axis(u) * turn);
+        (1.0 + turn * turn) / (left * right)
+    }
+
     /// Returns the position (x, y) in the frame of `ego` (m) at which the ray through a position in
     /// the image (px) meets a flat road, and the tangent of its angle below the horizon. Returns
     /// `None` above the horizon.

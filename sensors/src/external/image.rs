@@ -30,6 +30,8 @@ pub struct CameraMount {
     pub z_m: f64,
     /// Pitch, positive if it looks down (rad).
     pub pitch_rad: f64,
+    /// Yaw of the optical axis from straight behind, positive if it looks to the ego's left (rad).
+    pub yaw_rad: f64,
     /// Focal length (px of the image that the program gets).
     pub focal_px: f64,
     /// Coefficients k1 and k2 of the radial distortion (-).
@@ -48,6 +50,7 @@ impl CameraMount {
             x_m: -0.5 * ego_length_m + camera.mount_from_rear_m,
             z_m: camera.mount_height_m,
             pitch_rad: camera.pitch_rad,
+            yaw_rad: camera.yaw_rad,
             focal_px: camera.focal_px / f64::from(settings.step),
             distortion: camera.optics.distortion,
             size_px: [sampling.columns().len(), sampling.rows().len()],

@@ -3,7 +3,8 @@
 use crate::camera::{CameraConfig, Mask, Pipeline, fuse};
 use crate::tracking::{RearView, TrackList, Tracker, TrackerConfig, TrackerScan};
 use closecall_traffic::{
-    CONTROL_STEP, Check, Choice, Environment, Parameters, Road, Track, TrackStatus, VehicleClass, ego_frame::EgoFrame,
+    CONTROL_STEP, Check, Choice, Environment, Num, Parameters, Road, Track, TrackStatus, VehicleClass,
+    ego_frame::EgoFrame,
 };
 
 use super::*;
@@ -74,6 +75,32 @@ fn a_vehicle_that_both_see_gets_the_scores_of_the_image_and_a_width_from_the_mas
             seen.width_m
         );
         assert!(result.alone.is_empty());
+    }
+}
+
+#[test]
+fn a_turned_camera_gives_the_same_widths_and_places() {
+    for yaw_deg in [-20.0, 15.0, 20.0] {
+        let config = CameraConfig {
+            pipeline: Choice::Fixed(Pipeline::MaskRcnn),
+            yaw_deg: Num::Fixed(yaw_deg),
+            ..CameraConfig::default()
+        };
+        let camera = RearCamera::new(config.check(&Parameters::default()).unwrap());
+        for (distance_m, y_m) in [(15.0, 0.0), (30.0, 3.75), (50.0, -3.75)] {
+            let truth = detection(VehicleClass::Car, -distance_m, y_m);
+            let box_px = camera.detection_bounds(&ego(), &truth).unwrap();
+            let mask = Mask::new(box_px, [28, 28], vec![1.0; 28 * 28]).unwrap();
+            let instance = Instance { box_px, class: VehicleClass::Car, score: 0.8, mask };
+            let instances = std::slice::from_ref(&instance);
+            let found = with_scene(|scene| associate(&camera, scene, instances, std::slice::from_ref(&truth)));
+            let width_m = found.evidence[0].unwrap().width_m.unwrap();
+            assert!((width_m - truth.width_m).abs() < 0.1 * truth.width_m, "{yaw_deg}°, {distance_m} m: {width_m}");
+            let alone = with_scene(|scene| associate(&camera, scene, instances, &[])).alone;
+            let [seen] = &alone[..] else { panic!("{alone:?}") };
+            let off_m = [seen.face_x_m - truth.face_x_m, seen.face_y_m - truth.face_y_m];
+            assert!(off_m[0].abs() < seen.range_sd_m && off_m[1].abs() < 1.0, "{yaw_deg}°, {distance_m} m: {off_m:?}");
+        }
     }
 }
 

@@ -57,6 +57,7 @@ struct CameraMessage {
     x_m: f64,
     z_m: f64,
     pitch_rad: f64,
+    yaw_rad: f64,
     focal_px: f64,
     distortion_k1: f64,
     distortion_k2: f64,
@@ -161,9 +162,9 @@ fn lidar_message(lidar: &LidarMount) -> LidarMessage {
 }
 
 fn camera_message(camera: CameraMount) -> CameraMessage {
-    let CameraMount { x_m, z_m, pitch_rad, focal_px, distortion, size_px: [width, height], period_s } = camera;
+    let CameraMount { x_m, z_m, pitch_rad, yaw_rad, focal_px, distortion, size_px: [width, height], period_s } = camera;
     let [distortion_k1, distortion_k2] = distortion;
-    CameraMessage { x_m, z_m, pitch_rad, focal_px, distortion_k1, distortion_k2, width, height, period_s }
+    CameraMessage { x_m, z_m, pitch_rad, yaw_rad, focal_px, distortion_k1, distortion_k2, width, height, period_s }
 }
 
 fn image_message(image: &OutsideImage) -> ImageMessage {

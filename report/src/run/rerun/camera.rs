@@ -72,9 +72,7 @@ impl Shown {
 /// taken. The pitch of the body is left out.
 fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
     let ahead_m = camera.mount_from_rear_m - 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
-    let (sin, cos) = maths::sin_cos(camera.pitch_rad);
-    // The axes of the camera in the ego frame: right, down, and backward along the road.
-    let axes = [[0.0, 1.0, 0.0], [sin, 0.0, -cos], [-cos, 0.0, -sin]].map(|axis| axis.map(|value| value as f32));
+    let axes = axes(camera).map(|axis| axis.map(|value| value as f32));
     let position_m = [ahead_m as f32, 0.0, camera.mount_height_m as f32];
     writer.write_static(ENTITY, &Transform3D::from_translation_mat3x3(position_m, axes))?;
     let Shown { image, step_px, rows_px } = Shown::of(camera.resolution);
@@ -86,6 +84,18 @@ fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<()
         .with_principal_point([0.5 * width / step, (0.5 * height - first_row) / step])
         .with_image_plane_distance(IMAGE_DISTANCE_M);
     writer.write_static(ENTITY, &pinhole)
+}
+
+/// Returns the axes of the camera in the ego frame: right, down, and the optical axis, which points
+/// backward along the road if the camera has neither yaw nor pitch.
+fn axes(camera: &Camera) -> [[f64; 3]; 3] {
+    let ((sin, cos), (sin_yaw, cos_yaw)) = (maths::sin_cos(camera.pitch_rad), maths::sin_cos(camera.yaw_rad));
+    [
+        [sin_yaw, cos_yaw, 0.0],
+        // The difference from 0 is no negative zero.
+        [sin * cos_yaw, 0.0 - sin * sin_yaw, -cos],
+        [-cos * cos_yaw, cos * sin_yaw, -sin],
+    ]
 }
 
 /// Writes the images. Returns true if there are any.
@@ -229,6 +239,35 @@ fn class_colour(class: VehicleClass) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn camera(text: &str) -> Camera {
+        use closecall_traffic::Check;
+        let config: closecall_sensors::camera::CameraConfig = serde_json::from_str(text).unwrap();
+        config.check(&closecall_traffic::Parameters::default()).unwrap()
+    }
+
+    #[test]
+    fn the_axes_of_the_usual_camera_look_back_and_down() {
+        let (sin, cos) = maths::sin_cos(0.03);
+        let usual = [[0.0, 1.0, 0.0], [sin, 0.0, -cos], [-cos, 0.0, -sin]];
+        let bits = |axes: [[f64; 3]; 3]| axes.map(|axis| axis.map(f64::to_bits));
+        assert_eq!(bits(axes(&camera("{}"))), bits(usual));
+    }
+
+    #[test]
+    fn a_camera_turned_to_the_left_has_right_handed_axes_that_look_to_the_left() {
+        for (yaw_deg, side) in [(30, 0.5), (-30, -0.5)] {
+            let text = format!(r#"{{ "pitch-rad": 0.1, "yaw-deg": {yaw_deg} }}"#);
+            let [right, down, axis] = axes(&camera(&text));
+            assert!((axis[1] / maths::cos(0.1) - side).abs() < 1e-12 && axis[0] < 0.0 && axis[2] < 0.0, "{axis:?}");
+            let cross = |a: [f64; 3], b: [f64; 3]| {
+                [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+            };
+            for (got, wanted) in cross(right, down).iter().zip(axis) {
+                assert!((got - wanted).abs() < 1e-12, "{text}");
+            }
+        }
+    }
 
     #[test]
     fn the_usual_image_is_shown_by_every_fifth_pixel() {

@@ -3,7 +3,7 @@
 
 use crate::camera::effects::Effects;
 use closecall_traffic::{
-    Check, Environment, Light, Parameters, Road, Scene, SceneVehicle, Time, Vehicle, VehicleClass, VehicleState,
+    Check, Environment, Light, Num, Parameters, Road, Scene, SceneVehicle, Time, Vehicle, VehicleClass, VehicleState,
 };
 
 use super::*;
@@ -19,10 +19,11 @@ fn vehicle(class: VehicleClass, [s_m, d_m]: [f64; 2]) -> SceneVehicle {
     SceneVehicle { actor: 1, vehicle: Vehicle::typical(class), state, pitch_rad: 0.002 }
 }
 
-/// Compares both ways. Returns the number of pixels of one kind, the number of pixels that show a
+/// Compares both ways for a camera with this yaw (deg). Returns the number of pixels of one kind, the number of pixels that show a
 /// body, and the number of all pixels.
-fn compared(road: &Road, environment: &Environment, heading_rad: f64) -> [usize; 3] {
-    let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+fn compared(road: &Road, environment: &Environment, heading_rad: f64, yaw_deg: f64) -> [usize; 3] {
+    let config = CameraConfig { yaw_deg: Num::Fixed(yaw_deg), ..CameraConfig::default() };
+    let camera = config.check(&Parameters::default()).unwrap();
     let mut ego = vehicle(VehicleClass::Car, [731.3, -5.4]);
     ego.state.heading_rad = heading_rad;
     let others = [
@@ -69,10 +70,22 @@ fn pixels_of_one_kind_have_the_bits_of_their_moments() {
         for (road, heading_rad) in
             [(&straight, 0.0), (&straight, -0.03), (&Road::straight(2).with_curvature(-0.002), 0.02)]
         {
-            let [of_one_kind, of_bodies, all] = compared(road, &environment, heading_rad);
+            let [of_one_kind, of_bodies, all] = compared(road, &environment, heading_rad, 0.0);
             // Nearly all of the image is nothing but ground, sky or vehicles.
             assert!(of_one_kind * 10 > all * 8 && of_one_kind < all, "{of_one_kind} of {all}");
             assert!(of_bodies > 100, "{of_bodies}");
+        }
+    }
+}
+
+#[test]
+fn pixels_of_a_turned_camera_have_the_bits_of_their_moments() {
+    let curved = Road::straight(2).with_curvature(-0.002);
+    for yaw_deg in [-25.0, 40.0] {
+        for environment in [Environment::CLEAR_DAY, NIGHT, RAIN] {
+            // Sky, woods and bodies are computed at once. The ground is not.
+            let [of_one_kind, ..] = compared(&curved, &environment, 0.02, yaw_deg);
+            assert!(of_one_kind > 1_000, "{of_one_kind}");
         }
     }
 }
