@@ -52,6 +52,21 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
         ("number instead of a table", text("[sensors]", "[sensors]\nrear-lidar = 3\n[unused]"), &["table"]),
         ("lane beyond the road", text("lane = 2", "lane = 4"), &["lane", "4"]),
         ("no lanes", text("lanes = 3", "lanes = 0"), &["lanes", "0"]),
+        (
+            "image without pixels",
+            text("[sensors]", "[sensors]\nrear-camera = { resolution = { width-px = 0 } }"),
+            &["sensors.rear-camera.resolution.width-px", "is 0", "a number of columns from 640 to 3848"],
+        ),
+        (
+            "image beyond every sensor",
+            text("[sensors]", "[sensors]\nrear-camera = { resolution = { height-px = 100000 } }"),
+            &["sensors.rear-camera.resolution.height-px", "is 100000", "a number of rows from 480 to 2168"],
+        ),
+        (
+            "rear camera that looks ahead",
+            text("[sensors]", "[sensors]\nrear-camera = { yaw-deg = 180.0 }"),
+            &["sensors.rear-camera.yaw-deg", "is 180", "-55 to 55"],
+        ),
         ("unknown schema version", text("schema-version = 1", "schema-version = 2"), &["schema-version", "2"]),
         (
             "cut-out headway out of reach",

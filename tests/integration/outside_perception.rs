@@ -100,6 +100,11 @@ fn a_program_gets_the_images_that_it_is_to_have() {
     let settings = ["duration-s=2", "sensors.perception-image-hz=5", "sensors.perception-image-step=8"];
     let args: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
     stdout(&run("low-thw-overtake", &format!("{GROUPS} tracks"), &args), 0);
+    let camera = ["resolution.width-px=1921", "resolution.height-px=1208", "yaw-deg=12"];
+    let of_camera: Vec<String> = camera.map(|setting| format!("sensors.rear-camera.{setting}")).into();
+    let others = of_camera.iter().flat_map(|setting| ["--set", setting.as_str()]);
+    let args: Vec<&str> = args.iter().copied().chain(others).collect();
+    stdout(&run("low-thw-overtake", &format!("{GROUPS} tracks"), &args), 0);
     let output = closecall(["check", "low-thw-overtake", "--set", "sensors.perception-image-hz=50"]);
     assert_eq!(code(&output), 3, "{}", message(&output));
 }

@@ -7,8 +7,8 @@ use super::picture::Resolution;
 use super::sampling::Sampling;
 use closecall_traffic::maths;
 
-/// Side of the cells of the image that a blot of dirt covers or leaves (px of the usual image). On a lens of 5 mm with
-/// 1280 pixels, a blot of 0.15 mm covers about 40 pixels (assumption).
+/// Side of the cells of the image that a blot of dirt covers or leaves (px of the usual image). On
+/// a lens of 5 mm with 1280 pixels, a blot of 0.15 mm covers about 40 pixels (assumption).
 const BLOT_PX: i32 = 40;
 /// Colour of light that has passed through dirt, sRGB (assumption: dark brown, as of dried road
 /// spray).

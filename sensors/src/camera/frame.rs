@@ -68,8 +68,8 @@ pub struct Frame {
     pub(super) travelled_m: [f32; MOMENTS],
     /// Speed of the ego (m/s).
     pub(super) ego_speed_mps: f64,
-    /// Yaw of the ego in the plane plus the yaw of the camera (rad), from which the textures of woods
-    /// and clouds count.
+    /// Yaw of the ego in the plane plus the yaw of the camera (rad), from which the textures of
+    /// woods and clouds count.
     pub(super) bearing_rad: f32,
     pub(super) lists: FrameBuffers,
 }
@@ -307,7 +307,8 @@ impl Frame {
                 self.lens.in_camera([x + sign(0), y + sign(1), up + self.lens.height_m + sign(2)])
             });
             if let Some(bounds) = self.lens.bounds(&corners) {
-                self.lists.clouds.push((self.widened(bounds), cloud));
+                let bounds = self.widened(bounds);
+                self.lists.clouds.push((bounds, cloud));
             }
         }
     }

@@ -14,8 +14,8 @@ const GLARE_FROM_COSINE: f32 = 0.6;
 pub(crate) const NO_GLARE_TO_COSINE: f32 = GLARE_FROM_COSINE - 0.001;
 
 /// Places of the ghosts, as a multiple of the source's distance to the middle of the image, and
-/// their radii (px of the usual image): an assumption, because each lens has its own. Ghosts are the sharper the
-/// nearer the second reflection is to a focus.
+/// their radii (px of the usual image): an assumption, because each lens has its own. Ghosts are
+/// the sharper the nearer the second reflection is to a focus.
 const GHOSTS: [[f32; 2]; 3] = [[-0.5, 60.0], [-1.1, 36.0], [0.35, 90.0]];
 
 /// A halo, a streak or a ghost in the image.

@@ -10,8 +10,9 @@
 //! needs ONNX Runtime.
 //!
 //! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers
-//! 60° horizontally, unless a scenario says otherwise. A simulated run renders only the pixels that a network reads. Each pixel of a
-//! crop is identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
+//! 60° horizontally, unless a scenario says otherwise. A simulated run renders only the pixels that
+//! a network reads. Each pixel of a crop is identical, bit for bit, to the same pixel of the whole
+//! image (see [`Frame`]).
 
 mod background;
 mod body;

@@ -22,8 +22,8 @@ pub const HEIGHT_PX: u16 = 800;
 /// Horizontal field of view of the usual camera (rad): 60°.
 pub(super) const FIELD_OF_VIEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
-/// Focal length of the usual camera (px): half of the width over the tangent of half of the field of
-/// view, 1 / √3.
+/// Focal length of the usual camera (px): half of the width over the tangent of half of the field
+/// of view, 1 / √3.
 pub const FOCAL_PX: f64 = WIDTH_PX as f64 / 2.0 * 1.732_050_807_568_877_2;
 
 /// Numbers of columns and of rows that an image may have.
@@ -84,8 +84,8 @@ impl Resolution {
         [self.width_px, self.height_px].map(|extent| f64::from(extent) / 2.0)
     }
 
-    /// Returns how many pixels lie where the usual image has one: what has a size in the usual image
-    /// is larger by this factor.
+    /// Returns how many pixels lie where the usual image has one: what has a size in the usual
+    /// image is larger by this factor.
     pub(crate) fn scale(self) -> f64 {
         f64::from(self.width_px) / f64::from(WIDTH_PX)
     }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   ground frame G                          image
-//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px (`resolution`) = 60° (`field-of-view-deg`)
+//!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px = 60° by default
 //!   x along the ego's heading, y left, z up   │
 //!                                             ▼ v, 800 px
 //!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
@@ -111,8 +111,8 @@ impl Lens {
     pub(crate) fn new(camera: &Camera, ego: &SceneVehicle) -> Self {
         let ahead_m = camera.mount_from_rear_m - ego.vehicle.dimensions.length_m / 2.0;
         // If the nose of the ego dips, its tail rises: the lens moves up and its axis points
-        // higher. A turned camera pitches by a part of the angle; its roll by the other part, at most
-        // a degree, is neglected.
+        // higher. A turned camera pitches by a part of the angle; its roll by the other part, at
+        // most a degree, is neglected.
         let (sin_yaw, cos_yaw) = maths::sin_cos(camera.yaw_rad);
         let pitch = camera.pitch_rad - cos_yaw * ego.pitch_rad;
         Self {
@@ -134,8 +134,8 @@ impl Lens {
         self.yaw[1] != 0.0
     }
 
-    /// Rotates a horizontal vector from the ground frame to the level axes of the lens, which are the
-    /// axes of the ground frame turned by the yaw.
+    /// Rotates a horizontal vector from the ground frame to the level axes of the lens, which are
+    /// the axes of the ground frame turned by the yaw.
     fn in_level_axes(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         if !self.is_turned() {
             return [x, y];
@@ -328,7 +328,8 @@ mod tests {
         let [u, v] = tall.pixel([1.0, -0.5, 10.0]);
         let [usual_u, usual_v] = lens(0.0).pixel([1.0, -0.5, 10.0]);
         assert!((u - usual_u).abs() < 1e-9 && (v - usual_v - 100.0).abs() < 1e-9);
-        // Half of a window that reaches below the usual image lies in it, and all in the taller one.
+        // Half of a window that reaches below the usual image lies in it, and all in the taller
+        // one.
         let window = PixelRect { left: 0, top: 750, width: 100, height: 100 };
         assert_eq!([Resolution::USUAL, tall.image].map(|image| window.share_in_image(image)), [0.5, 1.0]);
     }

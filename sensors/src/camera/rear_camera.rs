@@ -225,8 +225,8 @@ mod tests {
         let shown = |picture: &LabelledImage| picture.instances.iter().filter(|instance| **instance == 1).count();
         let ratio = shown(&picture) as f64 / shown(&usual) as f64;
         assert!((3.9..4.1).contains(&ratio), "the car covers {ratio} times the pixels");
-        // The vehicle that a pixel shows is the vehicle that the same place of the fine image shows,
-        // but for the edges.
+        // The vehicle that a pixel shows is the vehicle that the same place of the fine image
+        // shows, but for the edges.
         let differ = (0..800).flat_map(|row| (0..1_280).map(move |column| (row, column))).filter(|(row, column)| {
             usual.instances[row * 1_280 + column] != picture.instances[2 * row * 2_560 + 2 * column]
         });

@@ -136,8 +136,8 @@ impl RearCamera {
         (u - self.camera().resolution.middle_px()[0]) / self.camera().focal_px
     }
 
-    /// Returns the distance between the slopes of two columns, divided by the distance of the columns
-    /// in units of the focal length: 1 if the camera looks straight back.
+    /// Returns the distance between the slopes of two columns, divided by the distance of the
+    /// columns in units of the focal length: 1 if the camera looks straight back.
     pub fn widening(&self, columns: [f64; 2]) -> f64 {
         let turn = maths::tan(self.camera().yaw_rad);
         let [left, right] = columns.map(|u| 1.0 - self.slope_to_axis(u) * turn);

@@ -10,8 +10,8 @@ use super::light::Illumination;
 use super::mesh::{Vec3, each};
 use super::picture::Resolution;
 
-/// Side of the square cells of the window (px of the usual image). A cell holds at most one speck of dirt and one
-/// drop.
+/// Side of the square cells of the window (px of the usual image). A cell holds at most one speck
+/// of dirt and one drop.
 const CELL_PX: i32 = 44;
 /// Width and height of the cells in which at most one streak of rain falls (px of the usual image).
 const STREAK_CELL_PX: [i32; 2] = [11, 64];

@@ -121,3 +121,26 @@ impl OutsideCamera {
         Some(OutsideImage { time: scene.time, width: picture.width, height: picture.height, rgb: picture.rgb })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Check, Parameters};
+
+    use super::*;
+    use crate::camera::CameraConfig;
+
+    #[test]
+    fn a_program_is_told_the_size_and_the_yaw_of_the_camera() {
+        let mount = |text: &str| {
+            let config: CameraConfig = toml::from_str(text).unwrap();
+            let settings = ImageSettings { period: Time::from_ms(200), step: 2 };
+            CameraMount::of(&config.check(&Parameters::default()).unwrap(), settings, 4.6)
+        };
+        let usual = mount("");
+        assert_eq!((usual.size_px, usual.yaw_rad), ([640, 400], 0.0));
+        let other = mount("resolution = { width-px = 1921, height-px = 1208 }\nyaw-deg = -30");
+        assert_eq!(other.size_px, [961, 604]);
+        assert!((other.yaw_rad + std::f64::consts::FRAC_PI_6).abs() < 1e-12);
+        assert!((other.focal_px / usual.focal_px - 1_921.0 / 1_280.0).abs() < 1e-12);
+    }
+}

@@ -2,9 +2,9 @@
 //! evaluates, or the instances of the Mask R-CNN.
 //!
 //! The closed loop never renders a whole camera image. This module renders it afterwards, from the
-//! same scene and the same noise. It renders every fifth pixel or so ([`Shown`]), and only at selected
-//! instants, since an image costs as much as a hundred control steps. An image and its marks stay
-//! visible until the next image. Faults of the camera do not appear in the images.
+//! same scene and the same noise. It renders every fifth pixel or so ([`Shown`]), and only at
+//! selected instants, since an image costs as much as a hundred control steps. An image and its
+//! marks stay visible until the next image. Faults of the camera do not appear in the images.
 //!
 //! The instances are the ones that the network found in the loop, at the moment of the exposure. So
 //! every image of the Mask R-CNN is one that the network evaluated.

@@ -19,8 +19,8 @@ fn vehicle(class: VehicleClass, [s_m, d_m]: [f64; 2]) -> SceneVehicle {
     SceneVehicle { actor: 1, vehicle: Vehicle::typical(class), state, pitch_rad: 0.002 }
 }
 
-/// Compares both ways for a camera with this yaw (deg). Returns the number of pixels of one kind, the number of pixels that show a
-/// body, and the number of all pixels.
+/// Compares both ways for a camera with this yaw (deg). Returns the number of pixels of one kind,
+/// the number of pixels that show a body, and the number of all pixels.
 fn compared(road: &Road, environment: &Environment, heading_rad: f64, yaw_deg: f64) -> [usize; 3] {
     let config = CameraConfig { yaw_deg: Num::Fixed(yaw_deg), ..CameraConfig::default() };
     let camera = config.check(&Parameters::default()).unwrap();

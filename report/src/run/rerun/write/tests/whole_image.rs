@@ -5,8 +5,8 @@
 
 use arrow::array::{Array, BinaryArray, FixedSizeListArray, Float32Array, ListArray, UInt8Array};
 use closecall_sensors::RearImage;
-use closecall_sensors::camera::{Instance, Mask, Pipeline};
-use closecall_traffic::VehicleClass;
+use closecall_sensors::camera::{CameraConfig, Instance, Mask, Pipeline};
+use closecall_traffic::{Check, Parameters, VehicleClass};
 
 use super::*;
 
@@ -48,6 +48,24 @@ fn pairs(chunk: &Chunk, component: &str) -> Vec<[f32; 2]> {
     let row = row.as_any().downcast_ref::<FixedSizeListArray>().unwrap();
     let numbers = row.values().as_any().downcast_ref::<Float32Array>().unwrap().values().to_vec();
     numbers[2 * row.offset()..][..2 * row.len()].chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
+}
+
+#[test]
+fn the_pinhole_has_the_size_of_the_picture_that_is_shown_of_a_larger_image() {
+    let mut film = filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full));
+    let shown = |film: Film| {
+        let all = chunks(&[film], StoreKind::Recording);
+        let of_camera = |chunk: &&Chunk| chunk.entity_path().to_string() == "/mis/world/ego/camera";
+        let has = |chunk: &&Chunk| {
+            chunk.components().values().any(|column| column.descriptor.component.as_str() == "Pinhole:resolution")
+        };
+        pairs(all.iter().filter(of_camera).find(has).unwrap(), "Pinhole:resolution")
+    };
+    let config = r#"{ "resolution": { "width-px": 2560, "height-px": 1200 }, "yaw-deg": 20 }"#;
+    let config: CameraConfig = serde_json::from_str(config).unwrap();
+    film.camera.as_mut().unwrap().0 = config.check(&Parameters::default()).unwrap();
+    // Every tenth of 2560 columns, and of the rows from 260 to 1020.
+    assert_eq!(shown(film), [[256.0, 76.0]]);
 }
 
 #[test]
