@@ -227,9 +227,10 @@ mod tests {
         assert!((3.9..4.1).contains(&ratio), "the car covers {ratio} times the pixels");
         // The vehicle that a pixel shows is the vehicle that the same place of the fine image
         // shows, but for the edges.
-        let differ = (0..800).flat_map(|row| (0..1_280).map(move |column| (row, column))).filter(|(row, column)| {
-            usual.instances[row * 1_280 + column] != picture.instances[2 * row * 2_560 + 2 * column]
-        });
+        let differ =
+            (0..800_usize).flat_map(|row| (0..1_280_usize).map(move |column| (row, column))).filter(|(row, column)| {
+                usual.instances[row * 1_280 + column] != picture.instances[2 * row * 2_560 + 2 * column]
+            });
         assert!(differ.count() < 2_000);
     }
 
