@@ -1,0 +1,119 @@
+//! The result of a boundary.
+
+use super::check::{Doubt, LeaveOneOut};
+use super::plan::BoundaryPlan;
+use super::search::{START_RUNS, Searched};
+use super::slices::{Area, Map, Slice, map, slices};
+use super::surface::FEWEST;
+use crate::sensitivity::RunErrors;
+
+/// A boundary along two parameters.
+#[derive(Clone, Debug)]
+pub struct Boundary {
+    /// The scenario's name.
+    pub scenario: String,
+    /// The seed.
+    pub seed: u64,
+    /// The sample whose random numbers all runs share.
+    pub sample: u64,
+    /// The settings of the command line.
+    pub settings: Vec<String>,
+    /// The controllers that were run, the one under test last.
+    pub controllers: Vec<String>,
+    /// The event whose boundary it is.
+    pub event: String,
+    /// The number that the event bounds.
+    pub quantity: String,
+    /// The two parameters.
+    pub keys: [String; 2],
+    /// Their ranges.
+    pub ranges: [[f64; 2]; 2],
+    /// The runs, in their order.
+    pub runs: Vec<Ran>,
+    /// The runs without an outcome.
+    pub errors: RunErrors,
+    /// The surface; `None` if the runs have none.
+    pub surveyed: Option<Surveyed>,
+}
+
+/// One run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ran {
+    /// The values of the two parameters.
+    pub at: [f64; 2],
+    /// The value of the number; `None` if the run ended in an error or does not have it.
+    pub value: Option<f64>,
+    /// Whether the event happens; `None` without a value.
+    pub happens: Option<bool>,
+    /// True for a run that fills the rectangle, false for one near the boundary.
+    pub is_start: bool,
+}
+
+/// What the Gaussian process says.
+#[derive(Clone, Debug)]
+pub struct Surveyed {
+    /// The boundary at values of the first parameter, in their order.
+    pub slices: Vec<Slice>,
+    /// The shares of the rectangle.
+    pub area: Area,
+    /// The surface over a grid of the rectangle.
+    pub map: Map,
+    /// Each run predicted from the others.
+    pub check: LeaveOneOut,
+    /// The reasons to doubt the surface.
+    pub doubts: Vec<Doubt>,
+}
+
+impl Boundary {
+    pub(super) fn new(plan: &BoundaryPlan, searched: &Searched, values: &[Option<f64>], errors: RunErrors) -> Self {
+        let ranges = [0, 1].map(|axis| [plan.axes[axis].low, plan.axes[axis].high]);
+        let place =
+            |point: [f64; 2]| [0, 1].map(|axis| ranges[axis][0] + point[axis] * (ranges[axis][1] - ranges[axis][0]));
+        let ran = |(index, (point, value)): (usize, (&[f64; 2], &Option<f64>))| Ran {
+            at: place(*point),
+            value: *value,
+            happens: value.map(|value| plan.event.happens(value)),
+            is_start: index < START_RUNS,
+        };
+        Self {
+            scenario: plan.file.config().name.clone(),
+            seed: plan.seed,
+            sample: plan.sample,
+            settings: plan.file.settings().iter().map(ToString::to_string).collect(),
+            controllers: plan.arms.iter().map(|arm| arm.controller.name().to_owned()).collect(),
+            event: plan.event.to_string(),
+            quantity: plan.event.quantity.to_string(),
+            keys: [0, 1].map(|axis| plan.axes[axis].key.clone()),
+            ranges,
+            runs: searched.points.iter().zip(values).enumerate().map(ran).collect(),
+            errors,
+            surveyed: surveyed(searched, ranges),
+        }
+    }
+
+    /// Returns true if there is a surface, and nothing is a reason to doubt it.
+    pub fn is_conclusive(&self) -> bool {
+        self.surveyed.as_ref().is_some_and(|surveyed| surveyed.doubts.is_empty())
+    }
+
+    /// Returns the number of runs with a value.
+    pub fn runs_with_value(&self) -> usize {
+        self.runs.iter().filter(|run| run.value.is_some()).count()
+    }
+
+    /// Returns why there is no surface.
+    pub fn absent(&self) -> String {
+        match self.runs_with_value() {
+            few if few < FEWEST => format!("{few} runs have a value of `{}`; {FEWEST} are required", self.quantity),
+            _ => format!("`{}` has the same value in all runs: it depends on neither parameter", self.quantity),
+        }
+    }
+}
+
+fn surveyed(searched: &Searched, ranges: [[f64; 2]; 2]) -> Option<Surveyed> {
+    let (surface, indices) = searched.surface()?;
+    let margins: Vec<f64> = searched.margins.iter().flatten().copied().collect();
+    let check = LeaveOneOut::new(&surface.leave_one_out(), &margins, &indices);
+    let (map, area) = map(&surface);
+    Some(Surveyed { slices: slices(&surface, ranges), area, map, check, doubts: check.doubts(area) })
+}
