@@ -9,7 +9,7 @@
 //! * [`json`]: results as JSON with stable keys
 //! * [`perception`]: studies of perception as text, JSON, Parquet and a page
 //! * [`page`], [`table`]: the common parts of all pages and of all Parquet tables
-//! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
+//! * [`study`]: output of sensitivity studies, frontiers and boundaries: tables, charts and pages
 //! * [`tables`]: the tables of one run: its trace, and the points of its LiDARs
 //! * [`traffic`]: texts and charts of results from trajectory data
 //!

@@ -60,6 +60,7 @@ fn advice(error: &CliError) -> Option<&'static str> {
             Some("--ego NAME names the ego, --parameter NAME=VALUE gives a value, --value-set N chooses values")
         }
         CliError::Sensitivity(_) => Some("see `closecall study sensitivity --help`"),
+        CliError::Boundary(_) => Some("see `closecall study boundary --help`"),
         CliError::Usage { .. } | CliError::Gates(_) | CliError::Arms(_) | CliError::Plan(_) | CliError::Causes(_) => {
             Some(ALL_OPTIONS)
         }

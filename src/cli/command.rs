@@ -37,7 +37,7 @@ struct Cli {
 }
 
 /// The commands that may run the camera's network, each as the words that name it.
-const WITH_NETWORK: [&[&str]; 21] = [
+const WITH_NETWORK: [&[&str]; 22] = [
     &["run"],
     &["campaign"],
     &["replay"],
@@ -53,6 +53,7 @@ const WITH_NETWORK: [&[&str]; 21] = [
     &["traffic", "record"],
     &["traffic", "sample"],
     &["study", "anchor"],
+    &["study", "boundary"],
     &["study", "frontier"],
     &["study", "map"],
     &["study", "sensitivity"],
@@ -167,8 +168,9 @@ enum Command {
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
 /// know them by their name alone.
-const GROUPED: [(&str, &str); 29] = [
+const GROUPED: [(&str, &str); 30] = [
     ("anchor", "study anchor"),
+    ("boundary", "study boundary"),
     ("calibrate", "traffic calibrate"),
     ("chain", "traffic chain"),
     ("completions", "tool completions"),

@@ -1,6 +1,7 @@
 //! The errors of the commands, and the exit code of each.
 
 use closecall_campaign::baseline::BaselineError;
+use closecall_campaign::boundary::BoundaryError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::failure::FailureKind;
@@ -175,6 +176,9 @@ pub enum CliError {
     /// A sensitivity study cannot be planned.
     #[error(transparent)]
     Sensitivity(#[from] PlanFailure),
+    /// A boundary cannot be planned.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
     /// A saved campaign cannot fulfil a request.
     #[error(transparent)]
     Saved(#[from] SavedError),
@@ -367,6 +371,9 @@ impl From<&CliError> for ExitCode {
             CliError::Sensitivity(PlanFailure::Workers(_)) => Self::Io,
             CliError::Sensitivity(PlanFailure::Fault(error)) => Self::from(&**error),
             CliError::Sensitivity(_) => Self::Usage,
+            CliError::Boundary(BoundaryError::Workers(_)) => Self::Io,
+            CliError::Boundary(BoundaryError::Fault(error)) => Self::from(&**error),
+            CliError::Boundary(_) => Self::Usage,
             CliError::Report(error) => error.kind().into(),
             CliError::Merge(error) => FailureKind::from(error).into(),
             CliError::Compare(error) => FailureKind::from(error).into(),

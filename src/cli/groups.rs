@@ -64,6 +64,8 @@ pub(super) enum Study {
     Sensitivity(study::SensitivityArgs),
     /// Compare settings of a system: what each prevents, induces, and costs in speed
     Frontier(study::FrontierArgs),
+    /// Find the boundary of failing and passing along two parameters, with its uncertainty
+    Boundary(study::BoundaryArgs),
     /// Hold emergency braking under human drivers against crash records: how often the ego strikes, and is struck from behind
     Anchor(study::AnchorArgs),
     /// Map the margin that the system reaches, over approach speed, detection distance and front time headway
@@ -136,6 +138,7 @@ impl Study {
         match self {
             Self::Sensitivity(args) => study::sensitivity(args),
             Self::Frontier(args) => study::frontier(args),
+            Self::Boundary(args) => study::boundary(args),
             Self::Anchor(args) => study::anchor(args),
             Self::Map(args) => causes::map(args),
             Self::Exposure(args) => causes::exposure(args),

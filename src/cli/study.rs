@@ -1,10 +1,11 @@
-//! `closecall study sensitivity`, `closecall study frontier` and `closecall study anchor`: studies that vary the assumptions, or the
-//! system, of a scenario.
+//! `closecall study sensitivity`, `closecall study frontier`, `closecall study boundary` and `closecall study anchor`: studies that
+//! vary the assumptions, or the system, of a scenario.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use closecall_campaign::arguments::count;
+use closecall_campaign::boundary::{Axis, BoundaryPlan, LARGEST_BUDGET, SMALLEST_BUDGET};
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};
 use closecall_campaign::runner::Sampling;
@@ -14,6 +15,7 @@ use closecall_campaign::stop::StopFlag;
 use closecall_campaign::workers::Workers;
 use closecall_report::study::{Study, write_study};
 use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::criteria::EventExpression;
 use closecall_scenarios::member::members;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
@@ -30,7 +32,7 @@ use super::help::{examples, heading};
 use super::output::{heartbeat, outln, print_text, print_written};
 use crate::exit_code::ExitCode;
 
-/// Arguments that both studies share.
+/// Arguments that the studies of a scenario share.
 #[derive(Debug, Args)]
 pub(super) struct StudyArgs {
     /// Scenario file, or name of a scenario of the library
@@ -103,6 +105,32 @@ pub(super) struct FrontierArgs {
     /// Number of samples, the same for every combination
     #[arg(short = 'n', long = "samples", default_value = "200", value_parser = count, help_heading = heading::SAMPLES)]
     samples: u64,
+}
+
+/// Arguments of `closecall study boundary`.
+#[derive(Debug, Args)]
+#[command(after_help = examples([
+    "closecall study boundary slow-approach --along closing-mps cut-out-thw-s -e \"min_thw_rear_s<0.3\"",
+    "closecall study boundary slow-approach --along closing-mps reaction-s -e \"min_gap_rear_m<2\" -o out",
+    "closecall study boundary slow-approach --along closing-mps=2..2.5 rear-cc1-s -e \"min_gap_rear_m<3\"",
+]))]
+pub(super) struct BoundaryArgs {
+    #[command(flatten)]
+    study: StudyArgs,
+    /// The two parameters of the boundary: numbers that the scenario samples, over all their values, or keys named as for --set,
+    /// with a range
+    #[arg(long = "along", value_name = "NAME|KEY=LOW..HIGH", num_args = 1.., required = true, help_heading = heading::METHOD)]
+    along: Vec<Axis>,
+    /// The event that happens on one side of the boundary: a number with a bound, such as "min_thw_rear_s < 0.3".
+    /// docs/reference/criteria.md lists the numbers
+    #[arg(short, long, value_name = "EVENT", help_heading = heading::METHOD)]
+    event: EventExpression,
+    /// Number of runs: 20 fill the rectangle of both parameters, the others are added near the boundary
+    #[arg(short = 'n', long = "runs", value_name = "N", default_value = "60", value_parser = clap::value_parser!(u64).range(SMALLEST_BUDGET..=LARGEST_BUDGET), help_heading = heading::METHOD)]
+    runs: u64,
+    /// Sample whose random numbers all runs share
+    #[arg(long, value_name = "N", default_value = "0", help_heading = heading::SAMPLES)]
+    sample: u64,
 }
 
 /// Arguments of `closecall study anchor`.
@@ -186,7 +214,13 @@ fn print(study: Option<Study>, format: Format, folder: Option<&Path>) -> Result<
     if let Some(folder) = folder {
         write_study(folder, &study)?.iter().for_each(|path| print_written(path));
     }
-    Ok(if study.errors() > 0 { ExitCode::SampleError } else { ExitCode::Pass })
+    Ok(if study.errors() > 0 {
+        ExitCode::SampleError
+    } else if study.is_conclusive() {
+        ExitCode::Pass
+    } else {
+        ExitCode::Inconclusive
+    })
 }
 
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
@@ -214,6 +248,16 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let prepared = plan.prepare()?;
     let found = run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
     study.print(found.map(Study::Frontier))
+}
+
+pub(super) fn boundary(args: &BoundaryArgs) -> Result<ExitCode, CliError> {
+    let study = &args.study;
+    let (file, sensors) = (study.file()?, study.sensors.map(SensorsChoice::mode));
+    let mut plan = BoundaryPlan::new(&file, &args.along, args.event, &study.controllers(&file)?, sensors)?;
+    plan.budget = usize::try_from(args.runs).unwrap_or(usize::MAX);
+    (plan.seed, plan.sample, plan.workers) = (study.seed, args.sample, Workers::with_jobs(study.jobs));
+    let found = run(args.runs, |stop, step| plan.run(stop, step))?;
+    study.print(found.map(Study::Boundary))
 }
 
 pub(super) fn anchor(args: &AnchorArgs) -> Result<ExitCode, CliError> {

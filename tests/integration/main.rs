@@ -9,6 +9,7 @@ mod architecture;
 mod arms;
 mod assumptions;
 mod book;
+mod boundary;
 mod calibrate;
 mod campaign_example;
 mod causes;

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use closecall_scenarios::parameters::ParameterSpace;
+use closecall_scenarios::parameters::{ParameterSpace, SpaceEntry};
+use closecall_traffic::ParameterName;
 
 use crate::sensitivity::{FactorRange, RangeError};
 
@@ -80,13 +81,15 @@ impl Axis {
         if let Some(range) = &self.range {
             return Ok(range.clone());
         }
-        let mut numbers =
-            space.varying().filter_map(|(name, entry)| Some((name.as_str(), entry.distribution.bounds()?)));
-        match numbers.clone().find(|(name, _)| *name == self.key) {
+        let number = |(name, entry): (&ParameterName, &SpaceEntry)| {
+            Some((name.as_str().to_owned(), entry.distribution.bounds()?))
+        };
+        let numbers: Vec<(String, [f64; 2])> = space.varying().filter_map(number).collect();
+        match numbers.iter().find(|(name, _)| *name == self.key) {
             // The text of a range is the only way to make one.
             Some((name, [low, high])) => Ok(format!("{name}={low:?}..{high:?}").parse()?),
             None => {
-                let sampled = numbers.by_ref().map(|(name, _)| name.to_owned()).collect();
+                let sampled = numbers.into_iter().map(|(name, _)| name).collect();
                 Err(AxisError::NoRange { key: self.key.clone(), sampled })
             }
         }

@@ -28,7 +28,7 @@ use crate::workers::{Samples, Workers};
 #[derive(Debug, thiserror::Error)]
 pub enum BoundaryError {
     /// Not two parameters are named.
-    #[error("a boundary needs two parameters, and {given} given: name each with --along")]
+    #[error("a boundary needs two parameters, and {given} given: name both with --along")]
     Count {
         /// The number of parameters with its verb.
         given: String,

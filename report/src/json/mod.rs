@@ -4,6 +4,7 @@
 //! part of the keys.
 
 mod anchor;
+mod boundary;
 mod campaign;
 mod comparison;
 mod frontier;
@@ -14,6 +15,7 @@ mod stamp;
 mod trajectory_data;
 
 pub use anchor::anchor;
+pub use boundary::boundary;
 pub use campaign::{campaign, campaign_report};
 pub use comparison::comparison;
 pub use frontier::frontier;

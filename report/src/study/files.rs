@@ -3,6 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
 
+use closecall_campaign::boundary::Boundary;
 use closecall_campaign::frontier::Frontier;
 use closecall_campaign::sensitivity::{FactorKind, RunErrors, Sensitivity};
 use closecall_studies::anchor::{Anchor, Quantity, Row};
@@ -15,6 +16,10 @@ use super::aligned::{error_lines, mean, with_interval};
 use super::anchor::{
     AnchorText, HEADS as ANCHOR_HEADS, cells as anchor_cells, charts as anchor_charts, conclusion as anchor_conclusion,
     name,
+};
+use super::boundary::{
+    BoundaryText, about, cells as boundary_cells, charts as boundary_charts, heads as boundary_heads, ranges,
+    statements, verdict,
 };
 use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, short};
 use super::sensitivity::{SensitivityText, conclusion};
@@ -29,6 +34,8 @@ pub enum Study {
     Sensitivity(Sensitivity),
     /// A frontier.
     Frontier(Frontier),
+    /// A boundary of failing and passing.
+    Boundary(Boundary),
     /// Emergency braking against crash records.
     Anchor(Anchor),
 }
@@ -38,6 +45,7 @@ impl Display for Study {
         match self {
             Self::Sensitivity(study) => SensitivityText(study).fmt(f),
             Self::Frontier(frontier) => FrontierText(frontier).fmt(f),
+            Self::Boundary(boundary) => BoundaryText(boundary).fmt(f),
             Self::Anchor(anchor) => AnchorText(anchor).fmt(f),
         }
     }
@@ -49,6 +57,7 @@ impl Study {
         let (value, seed) = match self {
             Self::Sensitivity(study) => (json::sensitivity(study), study.seed),
             Self::Frontier(frontier) => (json::frontier(frontier), frontier.seed),
+            Self::Boundary(boundary) => (json::boundary(boundary), boundary.seed),
             Self::Anchor(anchor) => (json::anchor(anchor), anchor.seed),
         };
         json::stamped(value, Some(seed), None)
@@ -59,7 +68,16 @@ impl Study {
         match self {
             Self::Sensitivity(study) => study.errors().points,
             Self::Frontier(frontier) => frontier.errors.points,
+            Self::Boundary(boundary) => boundary.errors.points,
             Self::Anchor(anchor) => anchor.errors.points,
+        }
+    }
+
+    /// Returns true if the runs say what the study asks. Only a boundary can be inconclusive.
+    pub fn is_conclusive(&self) -> bool {
+        match self {
+            Self::Boundary(boundary) => boundary.is_conclusive(),
+            Self::Sensitivity(_) | Self::Frontier(_) | Self::Anchor(_) => true,
         }
     }
 }
@@ -81,6 +99,11 @@ pub fn write_study(folder: &Path, study: &Study) -> Result<Vec<PathBuf>, WriteEr
             let charts = frontier_charts(frontier).map_err(fail)?;
             let page = frontier_page(frontier, &charts);
             ("frontier", "frontier", charts, page)
+        }
+        Study::Boundary(boundary) => {
+            let charts = boundary_charts(boundary).map_err(fail)?;
+            let page = boundary_page(boundary, &charts);
+            ("boundary", "boundary", charts, page)
         }
         Study::Anchor(anchor) => {
             let charts = anchor_charts(anchor).map_err(fail)?;
@@ -236,6 +259,37 @@ fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
             }))
             p.note { "Keys: " @for key in &frontier.keys { code { (key) } " " } }
         }
+    };
+    document(&title, &body)
+}
+
+fn boundary_page(boundary: &Boundary, charts: &Charts) -> Markup {
+    let title = format!("Boundary: {}", boundary.scenario);
+    let heads = boundary_heads(boundary);
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let body = html! {
+        (head(&title, &boundary.settings, &about(boundary)))
+        p { "Event: " code { (boundary.event) } ". " (ranges(boundary)) "." }
+        (errors(&boundary.errors, "runs"))
+        @for line in verdict(boundary) { p.failure { (line) } }
+        @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
+        p.note {
+            "Orange runs: the event happens; grey runs: it does not; black runs: no value. The line is where a Gaussian process "
+            "puts the boundary. In the grey band the event is not decided with 95 %; in the light orange area it happens."
+        }
+        @if let Some(surveyed) = &boundary.surveyed {
+            @for line in statements(surveyed) { p { (line) } }
+            section {
+                h2 { "Boundary" }
+                (table(&text_heads(&heads), &html! {
+                    @for slice in &surveyed.slices {
+                        @let [first, crossings] = boundary_cells(slice);
+                        tr { (number(first)) td { (crossings) } }
+                    }
+                }))
+            }
+        }
+        p.note { "Keys: " @for key in &boundary.keys { code { (key) } " " } }
     };
     document(&title, &body)
 }

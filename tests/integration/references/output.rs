@@ -366,6 +366,11 @@ fn the_keys_of_studies_are_those_documented() {
         ["study", "frontier", "low-thw-overtake", "-n", "20", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
     let errors = seeded(&[&frontier[..], &["--controller", "exec:false"]].concat(), 5);
     hold("frontier", [&seeded(&frontier, 0), &errors]);
+    let along = ["--along", "cut-out-thw-s", "closing-mps=3..7", "--event", "min_gap_rear_m < 6", "-n", "30"];
+    let boundary = [&["study", "boundary", "low-thw-overtake", "--sensors", "object"][..], &along].concat();
+    let conclusive = seeded(&[&boundary[..], &["--controller", "acc"]].concat(), 0);
+    let errors = seeded(&[&boundary[..], &["--controller", "exec:false"]].concat(), 5);
+    hold("boundary", [&conclusive, &errors]);
     let anchor = ["study", "anchor", "-n", "80", "--ensemble", "glances", "steer-none"];
     hold("anchor", [&seeded(&anchor, 0)]);
     let folder = folder();
