@@ -7,16 +7,15 @@ use super::surface::{Surface, Z_95};
 
 /// Number of first runs, which fill the rectangle: ten for each parameter (Loeppky, Sacks and Welch 2009).
 pub const START_RUNS: usize = 20;
-/// Smallest and largest number of runs. Ten runs are few to follow a boundary; the cost of a fit grows
-/// with the cube of the number.
+/// Smallest number of runs: an assumption; ten runs beside the first ones follow a simple boundary.
 pub const SMALLEST_BUDGET: u64 = 30;
-/// See [`SMALLEST_BUDGET`].
+/// Largest number of runs: the cost of a fit grows with the cube of the number.
 pub const LARGEST_BUDGET: u64 = 200;
 
 /// Number of times that the surface is fitted before the last runs.
 const ROUNDS: usize = 10;
 /// Number of candidates along each parameter.
-const SIDE: usize = 41;
+pub(super) const SIDE: usize = 41;
 /// Half the spacing of the numbers of the Sobol sequence, which have 23 bits.
 const HALF_CELL: f64 = 1.0 / (1_u32 << 24) as f64;
 /// Distance of coordinates below which a candidate is a run.
@@ -58,11 +57,6 @@ pub(super) fn coordinates(count: usize) -> impl Iterator<Item = f64> + Clone {
 /// Returns the candidates: a grid of the unit square, the second coordinate changing fastest.
 pub(super) fn grid() -> Vec<[f64; 2]> {
     coordinates(SIDE).flat_map(|x| coordinates(SIDE).map(move |y| [x, y])).collect()
-}
-
-/// Number of candidates along each parameter.
-pub(super) const fn side() -> usize {
-    SIDE
 }
 
 /// Runs up to `budget` points of the unit square. `evaluate` returns the margins of points, or `None`

@@ -1,7 +1,7 @@
 //! Where a surface crosses 0: along the second parameter for values of the first one, and over the
 //! whole rectangle.
 
-use super::search::{coordinates, grid, side};
+use super::search::{SIDE, coordinates, grid};
 use super::surface::{Predicted, Surface};
 
 /// Number of values of the first parameter.
@@ -64,7 +64,7 @@ pub(super) fn map(surface: &Surface) -> (Map, Area) {
         fails: share(|place| place.is_decided() && place.mean < 0.0),
         undecided: share(|place| !place.is_decided()),
     };
-    let columns = || places.chunks(side());
+    let columns = || places.chunks(SIDE);
     let means = columns().map(|column| column.iter().map(|place| place.mean).collect()).collect();
     let decided = columns().map(|column| column.iter().map(Predicted::is_decided).collect()).collect();
     (Map { means, decided }, area)
