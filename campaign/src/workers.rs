@@ -20,6 +20,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::Outcome;
 use closecall_simulation::{Arm, SampleError};
 
 use super::campaign_error::CampaignError;
@@ -85,6 +87,36 @@ pub(crate) trait Samples: Send + Sync + 'static {
     /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it.
     /// `on_outcome` gets the run before its validity checks, if it is checked in this process.
     fn run(&self, sample: u64, arm: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun;
+}
+
+/// Samples without validity checks, which a function runs.
+pub(crate) struct UncheckedSamples<R> {
+    scenario: String,
+    arms: Vec<Arm>,
+    run: R,
+}
+
+impl<R: Fn(u64, &Arm) -> Result<Outcome, SampleFailure> + Send + Sync + 'static> UncheckedSamples<R> {
+    /// Returns samples of a scenario. `run` runs one sample in one arm.
+    pub(crate) fn new(file: &ScenarioFile, arms: Vec<Arm>, run: R) -> Self {
+        Self { scenario: file.config().name.clone(), arms, run }
+    }
+}
+
+impl<R: Fn(u64, &Arm) -> Result<Outcome, SampleFailure> + Send + Sync + 'static> Samples for UncheckedSamples<R> {
+    fn scenario(&self) -> &str {
+        &self.scenario
+    }
+
+    fn arms(&self) -> &[Arm] {
+        &self.arms
+    }
+
+    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
+        let (arm, started) = (&self.arms[arm], Instant::now());
+        let record = ArmRecord::new(arm.controller.name().to_owned(), (self.run)(sample, arm));
+        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
+    }
 }
 
 /// Runs the samples of a campaign elsewhere than on threads of this process.

@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use closecall_scenarios::{ScenarioError, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
@@ -13,12 +12,11 @@ use closecall_simulation::{Arm, NoObserver, RunKey};
 use super::result::{Frontier, Point};
 use crate::campaign_error::WorkersError;
 use crate::ledger::Tally;
-use crate::record::{ArmRecord, SampleFailure};
-use crate::runner::{ArmRun, OnOutcome, concrete, guarded, run_guarded};
+use crate::runner::{concrete, guarded, run_guarded};
 use crate::sampling::Sampling;
 use crate::sensitivity::RunErrors;
 use crate::stop::StopFlag;
-use crate::workers::{Samples, Workers};
+use crate::workers::{UncheckedSamples, Workers};
 
 /// The part of a key that belongs to the margin increase system, which the baseline does not have.
 const OF_SYSTEM: &str = ".driver.ego-stack.mis.";
@@ -191,7 +189,11 @@ impl PreparedFrontier<'_> {
         let plan = self.plan;
         let arm = |controller: &ControllerChoice| Arm { controller: controller.factory(), sensors: plan.sensors };
         let arms = controller.map(arm).into_iter().collect();
-        let work = Arc::new(Unchecked { file: file.clone(), sampling: plan.sampling, arms });
+        let (owned_file, sampling) = (file.clone(), plan.sampling);
+        let work = Arc::new(UncheckedSamples::new(file, arms, move |sample: u64, arm: &Arm| {
+            let scenario = guarded(|| concrete(&owned_file, sampling, sample))?;
+            Ok(run_guarded(&scenario, RunKey { seed: sampling.seed, sample }, arm, &mut NoObserver)?)
+        }));
         let count = file.space().samples(plan.sampling.design, plan.sampling.samples);
         let mut tallies = Vec::new();
         plan.workers.run_samples(&work, 0..count, stop, |finished| {
@@ -199,40 +201,13 @@ impl PreparedFrontier<'_> {
                 tallies.push(arm.tally());
                 if let Err(failure) = &arm.result {
                     errors.points += 1;
-                    errors.kinds.entry(failure.kind.clone()).or_insert_with(|| (0, failure.message.clone())).0 += 1;
+                    errors.add_failure(failure);
                 }
             }
             on_run();
             Ok::<_, WorkersError>(ControlFlow::Continue(()))
         })?;
         Ok((tallies.len() as u64 == count).then_some(tallies))
-    }
-}
-
-/// Samples without validity checks, which a campaign makes.
-struct Unchecked {
-    file: ScenarioFile,
-    sampling: Sampling,
-    arms: Vec<Arm>,
-}
-
-impl Samples for Unchecked {
-    fn scenario(&self) -> &str {
-        &self.file.config().name
-    }
-
-    fn arms(&self) -> &[Arm] {
-        &self.arms
-    }
-
-    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
-        let (arm, started) = (&self.arms[arm], Instant::now());
-        let key = RunKey { seed: self.sampling.seed, sample };
-        let result = guarded(|| concrete(&self.file, self.sampling, sample))
-            .and_then(|scenario| run_guarded(&scenario, key, arm, &mut NoObserver));
-        let controller = arm.controller.name().to_owned();
-        let record = ArmRecord::new(controller, result.map_err(SampleFailure::from));
-        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
     }
 }
 

@@ -46,7 +46,7 @@ pub use mixture::{Component, Mixture};
 pub use nearness::{Nearness, NoGuide};
 pub use plan::RarePlan;
 pub use points::PointRunner;
-pub(crate) use points::PointSamples;
+pub(crate) use points::point_samples;
 pub use problem::{Point, Response, Seed, Simulator};
 pub use report::{Estimate, Nearest, RareReport};
 pub use search::{SearchResult, search};

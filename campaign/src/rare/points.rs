@@ -2,57 +2,26 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
-use closecall_scenarios::ScenarioFile;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 use closecall_traffic::Check;
 
 use super::problem::Point;
 use crate::campaign_error::CampaignError;
-use crate::record::{ArmRecord, SampleFailure};
-use crate::runner::{ArmRun, OnOutcome, Work, guarded, run_guarded};
+use crate::runner::{Work, guarded, run_guarded};
 use crate::stop::StopFlag;
-use crate::workers::{OnFinished, Samples};
+use crate::workers::{OnFinished, Samples, UncheckedSamples};
 
-/// Points of a scenario, ready to run. The number of a sample is the index of its point.
-pub(crate) struct PointSamples {
-    file: ScenarioFile,
-    arms: Vec<Arm>,
-    seed: u64,
-    points: Vec<Point>,
-}
-
-impl PointSamples {
-    /// Returns these points of a scenario.
-    pub(crate) fn of(work: &Work, points: &[Point]) -> Self {
-        Self { file: work.file.clone(), arms: work.arms.clone(), seed: work.sampling.seed, points: points.to_vec() }
-    }
-}
-
-impl Samples for PointSamples {
-    fn scenario(&self) -> &str {
-        &self.file.config().name
-    }
-
-    fn arms(&self) -> &[Arm] {
-        &self.arms
-    }
-
-    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
-        let (arm, started) = (&self.arms[arm], Instant::now());
-        let result = usize::try_from(sample).ok().and_then(|index| self.points.get(index)).map_or_else(
-            || Err(SampleError::Panic { message: "there is no such point".to_owned() }),
-            |point| {
-                let parameters = self.file.space().at_normals(&point.normals);
-                let scenario = guarded(|| self.file.config().check(&parameters).map_err(SampleError::Scenario))?;
-                let key = RunKey { seed: self.seed, sample: point.noise };
-                run_guarded(&scenario, key, arm, &mut NoObserver)
-            },
-        );
-        let record = ArmRecord::new(arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
-        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
-    }
+/// Returns points of a scenario, ready to run. The number of a sample is the index of its point.
+pub(crate) fn point_samples(work: &Work, points: &[Point]) -> impl Samples + use<> {
+    let (file, seed, points) = (work.file.clone(), work.sampling.seed, points.to_vec());
+    UncheckedSamples::new(&work.file, work.arms.clone(), move |sample: u64, arm: &Arm| {
+        let point = usize::try_from(sample).ok().and_then(|index| points.get(index));
+        let point = point.ok_or_else(|| SampleError::Panic { message: "there is no such point".to_owned() })?;
+        let parameters = file.space().at_normals(&point.normals);
+        let scenario = guarded(|| file.config().check(&parameters).map_err(SampleError::Scenario))?;
+        Ok(run_guarded(&scenario, RunKey { seed, sample: point.noise }, arm, &mut NoObserver)?)
+    })
 }
 
 /// Runs points elsewhere than on threads of this process.

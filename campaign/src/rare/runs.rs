@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::error::RareError;
 use super::journal::{RareJournal, RareRecord};
 use super::nearness::Nearness;
-use super::points::{PointRunner, PointSamples};
+use super::points::{PointRunner, point_samples};
 use super::problem::{Point, Response, Simulator};
 use super::report::Nearest;
 use crate::campaign_error::CampaignError;
@@ -107,7 +107,7 @@ impl Simulator for Runs<'_> {
         match remote {
             Some(remote) => remote.run_points((index, work), new, stop, &mut on_finished)?,
             None => {
-                let samples = Arc::new(PointSamples::of(work, new));
+                let samples = Arc::new(point_samples(work, new));
                 workers.run_samples(&samples, 0..new.len() as u64, stop, on_finished)?;
             }
         }

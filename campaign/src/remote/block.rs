@@ -20,7 +20,7 @@ use crate::folder::FolderError;
 use crate::host::{Refusal, refusal};
 use crate::manifest::{Manifest, version};
 use crate::plan::Plan;
-use crate::rare::{Point, PointSamples};
+use crate::rare::{Point, point_samples};
 use crate::runner::Work;
 use crate::saved::works;
 use crate::saved_error::SavedError;
@@ -122,7 +122,7 @@ impl BlockRunner {
         points: &[Point],
         mut on_finished: impl FnMut(Finished),
     ) -> Result<(), WorkersError> {
-        let samples = Arc::new(PointSamples::of(work, points));
+        let samples = Arc::new(point_samples(work, points));
         self.workers.run_samples(&samples, 0..points.len() as u64, &StopFlag::default(), |finished| {
             on_finished(finished);
             Ok::<_, WorkersError>(ControlFlow::Continue(()))

@@ -4,7 +4,6 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::outcome::Outcome;
@@ -14,10 +13,10 @@ use closecall_traffic::Check;
 use super::factor::FactorRange;
 use super::output::values;
 use crate::campaign_error::WorkersError;
-use crate::record::{ArmRecord, SampleFailure};
-use crate::runner::{ArmRun, OnOutcome, guarded, run_guarded};
+use crate::record::SampleFailure;
+use crate::runner::{guarded, run_guarded};
 use crate::stop::StopFlag;
-use crate::workers::{Samples, Workers};
+use crate::workers::{Samples, UncheckedSamples, Workers};
 
 /// Number of random numbers that the factor `chance` distinguishes. The numbers of the designs have
 /// no more bits.
@@ -33,6 +32,11 @@ pub struct RunErrors {
 }
 
 impl RunErrors {
+    /// Adds the failure of a run to the errors of its kind.
+    pub(crate) fn add_failure(&mut self, failure: &SampleFailure) {
+        self.kinds.entry(failure.kind.clone()).or_insert_with(|| (0, failure.message.clone())).0 += 1;
+    }
+
     /// Adds other errors.
     pub fn add(&mut self, other: &Self) {
         self.points += other.points;
@@ -77,31 +81,17 @@ impl Cube {
         let scenario = guarded(|| file.config().check(&file.space().at(parameters)).map_err(SampleError::Scenario))?;
         Ok(run_guarded(&scenario, key, arm, &mut NoObserver)?)
     }
-}
 
-/// The points of a design, ready to run.
-pub(super) struct Points<P> {
-    pub(super) cube: Arc<Cube>,
-    pub(super) arms: Vec<Arm>,
-    /// Returns a point by its number.
-    pub(super) point: P,
-}
-
-impl<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static> Samples for Points<P> {
-    fn scenario(&self) -> &str {
-        &self.cube.file.config().name
-    }
-
-    fn arms(&self) -> &[Arm] {
-        &self.arms
-    }
-
-    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
-        let (arm, started) = (&self.arms[arm], Instant::now());
-        let point = (self.point)(usize::try_from(sample).unwrap_or(usize::MAX));
-        let result = self.cube.run(&point, arm);
-        let record = ArmRecord::new(arm.controller.name().to_owned(), result);
-        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
+    /// Returns the points of a design, ready to run. `point` returns a point by its number.
+    pub(super) fn samples<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static>(
+        self: &Arc<Self>,
+        arms: Vec<Arm>,
+        point: P,
+    ) -> impl Samples + use<P> {
+        let cube = Arc::clone(self);
+        UncheckedSamples::new(&self.file, arms, move |sample: u64, arm: &Arm| {
+            cube.run(&point(usize::try_from(sample).unwrap_or(usize::MAX)), arm)
+        })
     }
 }
 
@@ -125,8 +115,8 @@ impl Ran {
 ///
 /// # Errors
 /// [`WorkersError`] if no threads can be started.
-pub(super) fn run<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static>(
-    points: Points<P>,
+pub(super) fn run(
+    points: impl Samples,
     count: usize,
     workers: Workers,
     stop: &StopFlag,
@@ -137,8 +127,7 @@ pub(super) fn run<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static>(
         let outputs = values(&finished.record);
         ran.errors.points += u64::from(outputs.is_none());
         for failure in finished.record.arms.iter().filter_map(|arm| arm.result.as_ref().err()) {
-            let first = || (0, failure.message.clone());
-            ran.errors.kinds.entry(failure.kind.clone()).or_insert_with(first).0 += 1;
+            ran.errors.add_failure(failure);
         }
         ran.outputs.push(outputs);
         on_point();

@@ -10,7 +10,7 @@ use super::defaults::LeftOut;
 use super::factor::{Factor, FactorKind};
 use super::output::Output;
 use super::plan::{Method, PlanFailure, SensitivityPlan};
-use super::runs::{Cube, Points, Ran, RunErrors, run};
+use super::runs::{Cube, Ran, RunErrors, run};
 use crate::stop::StopFlag;
 
 /// Least number of effects other than zero with which an output takes part in the choice of
@@ -191,7 +191,7 @@ impl SensitivityPlan {
         let design = Trajectories::new(self.factors.len(), self.trajectories, &mut self.random("morris"));
         let (points, of_runs) = (design.len(), design.clone());
         let point = move |index| of_runs.point(index);
-        let runs = Points { cube: cube.clone(), arms: self.arms.clone(), point };
+        let runs = cube.samples(self.arms.clone(), point);
         let Some(ran) = run(runs, points, self.workers, stop, on_point)? else { return Ok(None) };
         let effects = outputs
             .iter()
@@ -212,7 +212,7 @@ impl SensitivityPlan {
         let design = Design::new(self.factors.len(), factors, self.rows, &mut self.random("sobol"));
         let (points, of_runs) = (design.len(), design.clone());
         let point = move |index| of_runs.point(index);
-        let runs = Points { cube: cube.clone(), arms: self.arms.clone(), point };
+        let runs = cube.samples(self.arms.clone(), point);
         let Some(ran) = run(runs, points, self.workers, stop, on_point)? else { return Ok(None) };
         let indices = outputs
             .iter()
