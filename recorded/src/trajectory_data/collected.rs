@@ -240,15 +240,7 @@ impl Collected {
 /// Returns the number of each vehicle: its name, if all names are numbers, else the order in which
 /// the vehicles appear.
 fn numbers(names: &[String], notes: &mut Vec<String>) -> Vec<u64> {
-    let allowed = allowed::IDS.0.unsigned_abs()..=allowed::IDS.1.unsigned_abs();
-    let stated: Option<Vec<u64>> =
-        names.iter().map(|name| name.parse().ok().filter(|number| allowed.contains(number))).collect();
-    let mut distinct = stated.clone().unwrap_or_default();
-    distinct.sort_unstable();
-    distinct.dedup();
-    if let Some(stated) = stated
-        && distinct.len() == stated.len()
-    {
+    if let Some(stated) = distinct_numbers(names.iter().map(String::as_str), allowed::IDS.1.unsigned_abs()) {
         return stated;
     }
     if let [first, .., last] = names {
@@ -258,6 +250,14 @@ fn numbers(names: &[String], notes: &mut Vec<String>) -> Vec<u64> {
         ));
     }
     (1..=names.len() as u64).collect()
+}
+
+/// Returns the numbers that names state, if all are numbers up to `largest`, and none is there twice.
+pub(super) fn distinct_numbers<'n>(names: impl Iterator<Item = &'n str>, largest: u64) -> Option<Vec<u64>> {
+    let number = |name: &str| name.parse::<u64>().ok().filter(|number| *number <= largest);
+    let numbers: Vec<u64> = names.map(number).collect::<Option<_>>()?;
+    let distinct: BTreeSet<u64> = numbers.iter().copied().collect();
+    (distinct.len() == numbers.len()).then_some(numbers)
 }
 
 /// Returns the number of periods in `span`.
@@ -398,6 +398,12 @@ pub(super) struct CollectedSource {
 }
 
 impl CollectedSource {
+    /// Returns rows whose road and lanes the file states.
+    pub(super) fn of_rows(rows: Vec<Row>, info: FileInfo, notes: Vec<String>, unknown_classes: UnknownClasses) -> Self {
+        let items = rows.into_iter().map(Ok).collect();
+        Self { items, info, notes, is_in_doubt: false, unknown_classes, lane_sides: LaneSides::default() }
+    }
+
     /// Adds what vehicles beside each other show of the lanes.
     pub(super) fn with_lane_sides(self, lane_sides: LaneSides) -> Self {
         Self { lane_sides, ..self }

@@ -22,15 +22,15 @@ use std::io::BufRead;
 
 use closecall_traffic::{Lane, Time, VehicleClass, maths};
 
-use super::class_names::{UnknownClass, UnknownClasses};
-use super::collected::{Collected, CollectedRow, Facts, Position};
+use super::class_names::UnknownClasses;
+use super::collected::{Collected, CollectedRow, CollectedSource, Facts, Position, distinct_numbers};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::Bounds;
 use super::file_layout::Layout;
 use super::json_input::JsonInput;
 use super::markings::LaneMarkings;
-use super::openlabel_text::{LabelledRow, Metadata, OpenLabelText, Timestamp};
+use super::openlabel_text::{LabelledRow, OpenLabelText, Timestamp};
 use super::plain::allowed;
 use super::rows::io_problem;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
@@ -233,57 +233,44 @@ fn lane_number(path: &str, value: f64) -> Result<u8, ReadError> {
     whole(path, names::LANE, value, f64::from(u8::MAX)).map(|lane| u8::try_from(lane).unwrap_or(u8::MAX))
 }
 
-/// Rows on the recorded road, in the order of their frames.
-struct RoadSource {
-    rows: std::vec::IntoIter<Row>,
-    info: FileInfo,
-    unknown_classes: UnknownClasses,
-    notes: Vec<String>,
-}
-
-impl RowSource for RoadSource {
-    fn info(&self) -> FileInfo {
-        self.info.clone()
-    }
-
-    fn unknown_classes(&self) -> &[UnknownClass] {
-        self.unknown_classes.names()
-    }
-
-    fn warnings(&self) -> Vec<String> {
-        self.notes.clone()
-    }
-
-    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
-        Ok(self.rows.next())
-    }
-}
-
 /// Returns the numbers of tracks: the names of the objects if all are numbers, else their order.
 fn numbers(text: &OpenLabelText, notes: &mut Vec<String>) -> Vec<u64> {
-    let number = |uid: &str| uid.parse().ok().filter(|number| (0..=allowed::TRACKS.1.unsigned_abs()).contains(number));
-    let stated: Option<Vec<u64>> = text.objects.iter().map(|object| number(&object.uid)).collect();
-    let distinct = stated.as_ref().map(|numbers| numbers.iter().collect::<BTreeSet<_>>().len());
-    if let Some(stated) = stated.filter(|numbers| distinct == Some(numbers.len())) {
-        return stated;
+    let names = text.objects.iter().map(|object| object.uid.as_str());
+    distinct_numbers(names, allowed::TRACKS.1.unsigned_abs()).unwrap_or_else(|| {
+        notes.push("the names of objects are not numbers: they are numbered in their order".to_owned());
+        (1..=text.objects.len() as u64).collect()
+    })
+}
+
+/// Returns the classes of the objects.
+fn classes(text: &OpenLabelText, unknown: &mut UnknownClasses) -> Vec<VehicleClass> {
+    text.objects.iter().map(|object| class_of(&object.kind, unknown)).collect()
+}
+
+/// Returns the clock of a file.
+fn clock(text: &OpenLabelText) -> Clock {
+    match text.metadata.as_ref().is_some_and(|metadata| metadata.simulated) {
+        true => Clock::Simulated,
+        false => Clock::Continuous,
     }
-    notes.push("the names of objects are not numbers: they are numbered in their order".to_owned());
-    (1..=text.objects.len() as u64).collect()
+}
+
+/// Returns the acceleration that a file states for a vehicle in a frame.
+fn acceleration_mps2(path: &str, row: &LabelledRow) -> Result<Option<f64>, ReadError> {
+    let checked = |mps2| checked(path, names::ACCELERATION, mps2, allowed::ACCELERATION_MPS2);
+    row.acceleration_mps2.map(checked).transpose()
 }
 
 /// Returns the rows of a file that states positions and lanes on the road.
-fn on_road(mut text: OpenLabelText) -> Result<RoadSource, ReadError> {
+fn on_road(mut text: OpenLabelText) -> Result<CollectedSource, ReadError> {
     let mut rows = std::mem::take(&mut text.rows);
     rows.sort_by_key(|row| (row.frame, row.object));
     let mut notes = Vec::new();
     let numbers = numbers(&text, &mut notes);
     let mut unknown_classes = UnknownClasses::default();
-    let classes: Vec<VehicleClass> =
-        text.objects.iter().map(|object| class_of(&object.kind, &mut unknown_classes)).collect();
+    let classes = classes(&text, &mut unknown_classes);
     let times = Times::new(&text)?;
-    let metadata = text.metadata.as_ref();
-    let is_simulated = metadata.is_some_and(|metadata| metadata.simulated);
-    let clock = if is_simulated { Clock::Simulated } else { Clock::Continuous };
+    let clock = clock(&text);
     let row = |row: LabelledRow| {
         let path = path_of(&text, &row);
         let (object, number) = (&text.objects[row.object as usize], numbers[row.object as usize]);
@@ -294,9 +281,6 @@ fn on_road(mut text: OpenLabelText) -> Result<RoadSource, ReadError> {
         };
         let speed_mps = checked(&path, names::SPEED, need(names::SPEED, row.speed_mps)?, SPEED_MPS)?;
         let lane = lane_number(&path, need(names::LANE, row.lane)?)?;
-        let acceleration = row.acceleration_mps2;
-        let acceleration =
-            acceleration.map(|mps2| checked(&path, names::ACCELERATION, mps2, allowed::ACCELERATION_MPS2));
         let time = match row.time_s {
             Some(time_s) => Time::from_s(checked(&path, names::TIME, time_s, EPOCH_S)?),
             None => times.at(row.frame)?,
@@ -316,7 +300,7 @@ fn on_road(mut text: OpenLabelText) -> Result<RoadSource, ReadError> {
             d_m: checked(&path, "y of the cuboid", row.y_m, LATERAL_M)?,
             lane,
             speed_mps,
-            acceleration_mps2: acceleration.transpose()?,
+            acceleration_mps2: acceleration_mps2(&path, &row)?,
             length_m: checked(&path, "the length of the cuboid", row.length_m, allowed::LENGTH_M)?,
             width_m: checked(&path, "the width of the cuboid", row.width_m, allowed::WIDTH_M)?,
             class: classes[row.object as usize],
@@ -327,11 +311,11 @@ fn on_road(mut text: OpenLabelText) -> Result<RoadSource, ReadError> {
     let rows: Vec<Row> = rows.into_iter().map(row).collect::<Result<_, ReadError>>()?;
     let info = FileInfo {
         layout: Layout::OpenLabel,
-        name: metadata.and_then(|metadata: &Metadata| metadata.name.clone()),
+        name: text.metadata.as_ref().and_then(|metadata| metadata.name.clone()),
         period: times.period_s.map(Time::from_s),
         markings: markings(&text.right_edges_m)?,
     };
-    Ok(RoadSource { rows: rows.into_iter(), info, unknown_classes, notes })
+    Ok(CollectedSource::of_rows(rows, info, notes, unknown_classes))
 }
 
 /// Lateral positions of several roads beside each other, 1 km apart (m).
@@ -353,8 +337,7 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
     let mut rows = std::mem::take(&mut text.rows);
     rows.sort_by_key(|row| (row.object, row.frame));
     let mut unknown_classes = UnknownClasses::default();
-    let classes: Vec<VehicleClass> =
-        text.objects.iter().map(|object| class_of(&object.kind, &mut unknown_classes)).collect();
+    let classes = classes(&text, &mut unknown_classes);
     let times = Times::new(&text)?;
     let mut collected = Collected::default();
     for of_object in rows.chunk_by(|a, b| a.object == b.object) {
@@ -373,16 +356,13 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
                 if span_s > 0.0 { along_m / span_s } else { 0.0 }
             };
             let speed_mps = row.speed_mps.unwrap_or_else(derived);
-            let acceleration = row.acceleration_mps2;
-            let acceleration =
-                acceleration.map(|mps2| checked(&path, names::ACCELERATION, mps2, allowed::ACCELERATION_MPS2));
             let vehicle = collected.vehicle(&text.objects[row.object as usize].uid);
             collected.push(Ok(CollectedRow {
                 vehicle,
                 time: instants[k],
                 position: Position::Plane { point, heading_rad, changes_lane: false, named_lane: None },
                 speed_mps: checked(&path, "the speed", speed_mps, SPEED_MPS)?,
-                acceleration_mps2: acceleration.transpose()?,
+                acceleration_mps2: acceleration_mps2(&path, row)?,
                 length_m: checked(&path, "the length of the cuboid", row.length_m, allowed::LENGTH_M)?,
                 width_m: checked(&path, "the width of the cuboid", row.width_m, allowed::WIDTH_M)?,
                 class: classes[row.object as usize],
@@ -390,10 +370,9 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
             }))?;
         }
     }
-    let is_simulated = text.metadata.as_ref().is_some_and(|metadata| metadata.simulated);
     Ok(Box::new(collected.into_source(Facts {
         layout: Layout::OpenLabel,
-        clock: if is_simulated { Clock::Simulated } else { Clock::Continuous },
+        clock: clock(&text),
         lane_width_m: None,
         markings: None,
         notes: Vec::new(),
