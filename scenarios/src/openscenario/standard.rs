@@ -274,6 +274,14 @@ const STORYBOARD_ELEMENT_STATE: [&str; 7] = [
 ];
 const STORYBOARD_ELEMENT_TYPE: [&str; 6] = ["act", "action", "event", "maneuver", "maneuverGroup", "story"];
 
+/// The type `TransitionDynamics` of the standard.
+const TRANSITION_DYNAMICS: [Attribute; 4] = [
+    word("dynamicsDimension", &DYNAMICS_DIMENSION),
+    word("dynamicsShape", &DYNAMICS_SHAPE),
+    word("followingMode", &FOLLOWING_MODE),
+    number("value"),
+];
+
 static ELEMENTS: [Element; 133] = [
     element(
         "OpenSCENARIO",
@@ -466,16 +474,7 @@ static ELEMENTS: [Element; 133] = [
     element("RoadCondition", &[at_least_0("frictionScaleFactor"), word("wetness", &WETNESS)], &["Properties"]),
     element("LongitudinalAction", &[], &["SpeedAction", "LongitudinalDistanceAction", "SpeedProfileAction"]),
     element("SpeedAction", &[], &["SpeedActionDynamics", "SpeedActionTarget"]),
-    element(
-        "SpeedActionDynamics",
-        &[
-            word("dynamicsDimension", &DYNAMICS_DIMENSION),
-            word("dynamicsShape", &DYNAMICS_SHAPE),
-            word("followingMode", &FOLLOWING_MODE),
-            number("value"),
-        ],
-        &[],
-    ),
+    element("SpeedActionDynamics", &TRANSITION_DYNAMICS, &[]),
     element("SpeedActionTarget", &[], &["RelativeTargetSpeed", "AbsoluteTargetSpeed"]),
     element("AbsoluteTargetSpeed", &[number("value")], &[]),
     element(
@@ -520,16 +519,7 @@ static ELEMENTS: [Element; 133] = [
     ),
     element("LateralAction", &[], &["LaneChangeAction", "LaneOffsetAction", "LateralDistanceAction"]),
     element("LaneChangeAction", &[number("targetLaneOffset")], &["LaneChangeActionDynamics", "LaneChangeTarget"]),
-    element(
-        "LaneChangeActionDynamics",
-        &[
-            word("dynamicsDimension", &DYNAMICS_DIMENSION),
-            word("dynamicsShape", &DYNAMICS_SHAPE),
-            word("followingMode", &FOLLOWING_MODE),
-            number("value"),
-        ],
-        &[],
-    ),
+    element("LaneChangeActionDynamics", &TRANSITION_DYNAMICS, &[]),
     element("LaneChangeTarget", &[], &["RelativeTargetLane", "AbsoluteTargetLane"]),
     element("AbsoluteTargetLane", &[integer("value")], &[]),
     element("RelativeTargetLane", &[text("entityRef"), integer("value")], &[]),
