@@ -15,7 +15,7 @@ use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Time, VehicleState};
 use serde_json::Value;
 
-use crate::support::{all_of_library, closecall, code, folder, json, library, message, stderr, stdout};
+use crate::support::{all_of_library, closecall, code, folder, json, library, message, records, stderr, stdout};
 
 const SAMPLES: usize = 24;
 
@@ -34,10 +34,6 @@ fn campaign(folder: &Path, name: &str, arms: &str, more: &[&str]) -> PathBuf {
     let out = folder.join(name);
     stdout(&closecall(args(&out, arms, more)), 0);
     out
-}
-
-fn records(folder: &Path) -> Vec<Record> {
-    SavedCampaign::open(folder).unwrap().folder().records().unwrap().collect::<Result<_, _>>().unwrap()
 }
 
 /// The outcomes of a campaign, by sample and controller.

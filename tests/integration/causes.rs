@@ -4,10 +4,9 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use closecall_campaign::folder::Folder;
 use serde_json::Value;
 
-use crate::support::{ROOT, closecall, code, folder, json, library, message, stdout};
+use crate::support::{ROOT, closecall, code, folder, json, library, message, records, stdout};
 
 /// The seed of all campaigns here.
 const SEED: &str = "4021";
@@ -24,8 +23,7 @@ fn campaign(parent: &Path, name: &str, samples: u64, arguments: &[&str]) -> Path
 
 /// Returns the samples of a campaign in which any vehicles collide in the arm under test.
 fn failing(folder: &Path) -> BTreeSet<u64> {
-    let records = Folder::open(folder).records().unwrap().map(Result::unwrap);
-    let fails = records.filter(|record| {
+    let fails = records(folder).into_iter().filter(|record| {
         record.arms.last().is_some_and(|arm| arm.result.as_ref().is_ok_and(|outcome| !outcome.collisions.is_empty()))
     });
     fails.map(|record| record.sample).collect()

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use closecall_testing::data;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, message, stderr, stdout};
+use crate::support::{closecall, code, folder, journal, json, message, stderr, stdout};
 
 /// Frames per second of the recording.
 const RATE: f64 = 10.0;
@@ -155,18 +155,12 @@ fn each_sample_of_an_encounter_differs_and_an_interrupted_chain_resumes() {
     let [whole, half] = ["whole", "half"].map(|name| folder.path().join(name));
     let more = ["-n", "200", "--encounters", "1", "--sensors", "object", "--seed", "7"];
     stdout(&closecall(arguments(&recording, &whole, &more)), 0);
-    let journal = fs::read_to_string(whole.join("journal.jsonl")).unwrap();
-    let parameters: BTreeSet<String> = journal
-        .lines()
-        .map(|line| {
-            // Each line begins with its hash.
-            let record: Value = serde_json::from_str(line.split_once(' ').unwrap().1).unwrap();
-            record["arms"][0]["result"]["Ok"]["parameters"].to_string()
-        })
-        .collect();
+    let parameters: BTreeSet<String> =
+        journal(&whole).iter().map(|record| record["arms"][0]["result"]["Ok"]["parameters"].to_string()).collect();
     assert_eq!(parameters.len(), 200, "{:?}", parameters.first());
     stdout(&closecall(arguments(&recording, &half, &more)), 0);
     // As a killed program leaves it: part of the journal with an unfinished line, and no report.
+    let journal = fs::read_to_string(whole.join("journal.jsonl")).unwrap();
     let cut: usize = journal.len() / 2;
     fs::write(half.join("journal.jsonl"), &journal[..cut]).unwrap();
     for file in ["report.html", "outcomes.parquet", "origins.json"] {

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_campaign::folder::Folder;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, library, message, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, message, records, stderr, stdout};
 
 fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
     let scenario = library("low-thw-overtake");
@@ -21,11 +20,10 @@ fn compare(baseline: &Path, other: &Path, more: &[&str]) -> std::process::Output
 
 /// Returns the samples of a campaign's journal in which the ego collided.
 fn failing(folder: &Path) -> Vec<u64> {
-    let records = Folder::open(folder).records().unwrap().map(Result::unwrap);
     let collided = |record: &closecall_campaign::record::Record| {
         record.arms.last().unwrap().result.as_ref().unwrap().ego_collided()
     };
-    records.filter(collided).map(|record| record.sample).collect()
+    records(folder).into_iter().filter(collided).map(|record| record.sample).collect()
 }
 
 #[test]

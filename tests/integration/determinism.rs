@@ -4,13 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use closecall_campaign::folder::Folder;
 use closecall_campaign::record::Record;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::{NoObserver, simulate};
 use serde_json::Value;
 
-use crate::support::{closecall, folder, json, library, stdout};
+use crate::support::{closecall, folder, json, library, records, stdout};
 
 /// Runs a paired campaign of 60 samples, or of another number, with seed 7.
 fn campaign(out: &Path, more: &[&str]) {
@@ -87,11 +86,6 @@ fn a_campaign_writes_the_same_bytes_with_any_number_of_jobs_and_in_every_repetit
             assert!(*bytes == other[name], "{name} differs between one job and {variant}");
         }
     }
-}
-
-/// Returns the records of a campaign's journal in the order of the samples.
-fn records(out: &Path) -> Vec<Record> {
-    Folder::open(out).records().unwrap().map(Result::unwrap).collect()
 }
 
 #[test]

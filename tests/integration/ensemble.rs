@@ -12,7 +12,7 @@ use closecall_traffic::{
 };
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, message, stdout};
+use crate::support::{closecall, code, folder, journal, json, message, stdout};
 
 const ARGS: [&str; 9] =
     ["campaign", "low-thw-overtake", "--paired", "-n", "6", "--sensors", "ground-truth", "--no-gate", "--seed=71"];
@@ -20,12 +20,6 @@ const ARGS: [&str; 9] =
 fn campaign(out: &Path, more: &[&str]) -> std::process::Output {
     let args = ARGS.iter().chain(more).copied().map(str::to_owned);
     closecall(args.chain(["--out".to_owned(), out.display().to_string()]))
-}
-
-/// Returns the records of a journal: a line is a checksum and a record.
-fn journal(out: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(out.join("journal.jsonl")).unwrap();
-    text.lines().map(|line| serde_json::from_str(line.split_once(' ').unwrap().1).unwrap()).collect()
 }
 
 #[test]

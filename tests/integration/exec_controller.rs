@@ -7,12 +7,11 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use closecall_campaign::folder::Folder;
 use closecall_campaign::record::Record;
 use closecall_testing::has_python;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, library, message, program, stderr, stdout};
+use crate::support::{closecall, code, folder, library, message, program, records, stderr, stdout};
 
 /// The time that a controller has for an answer (ms): much longer than any of these controllers
 /// needs.
@@ -161,7 +160,6 @@ fn a_script_that_is_there_but_cannot_be_started_is_told_why() {
 /// Returns the results of a campaign by sample: the outcome without the keys that name the
 /// controller, or the error message.
 fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
-    let records = Folder::open(out).records().unwrap().map(Result::unwrap);
     let result = |record: Record| {
         let result = record.arms.last().unwrap().result.clone();
         let comparable = result.map_err(|failure| failure.message).map(|outcome| {
@@ -173,7 +171,7 @@ fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
         });
         (record.sample, comparable)
     };
-    records.map(result).collect()
+    records(out).into_iter().map(result).collect()
 }
 
 /// Runs a campaign of samples of `low-thw-overtake` with a controller.

@@ -4,9 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
-use crate::support::{closecall, code, folder, json, message, stderr, stdout};
+use crate::support::{closecall, code, folder, json, json_file, message, stderr, stdout};
 
 const SAMPLES: u64 = 60;
 
@@ -34,7 +32,7 @@ impl Earlier {
         let (folder, file) = (place.join("earlier"), place.join("earlier.json"));
         stdout(&campaign(&folder, "--controller acc --no-gate"), 0);
         stdout(&closecall(["baseline", "save", folder.to_str().unwrap(), file.to_str().unwrap()]), 0);
-        let baseline: Value = serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+        let baseline = json_file(&file);
         let failing = baseline["scenarios"]["low-thw-overtake"]["failing"].as_array().unwrap();
         let failing: Vec<u64> = failing.iter().map(|sample| sample.as_u64().unwrap()).collect();
         assert!(failing.len() > 6 && failing[5] > 5, "the plain order is another one: {failing:?}");

@@ -2,9 +2,7 @@
 
 use std::fs;
 
-use serde_json::Value;
-
-use crate::support::{ROOT, closecall, code, folder, json, library, message, stdout};
+use crate::support::{ROOT, closecall, code, folder, journal, json, json_file, library, message, stdout};
 
 #[test]
 fn fitted_distributions_replace_those_of_a_scenario_and_stand_in_the_manifest() {
@@ -17,15 +15,12 @@ fn fitted_distributions_replace_those_of_a_scenario_and_stand_in_the_manifest() 
     stdout(&closecall(["check", scenario, "--fitted", fitted]), 0);
     let words = ["campaign", scenario, "-n", "8", "--sensors", "object", "--no-gate", "--fitted", fitted, "--out"];
     stdout(&closecall(words.into_iter().chain([out.to_str().unwrap()])), 0);
-    let manifest: Value = serde_json::from_str(&fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
+    let manifest = json_file(&out.join("manifest.json"));
     let settings = manifest["scenarios"][0]["settings"].to_string();
     assert!(settings.contains("parameters.brake-mps2") && settings.contains("blake3"), "{settings}");
     let text = manifest["scenarios"][0]["text"].as_str().unwrap();
     assert!(text.contains("quantiles = [5.0, 5.5, 6.0]") && !text.contains("min = 4.0, max = 8.0"), "{text}");
-    let journal = fs::read_to_string(out.join("journal.jsonl")).unwrap();
-    for line in journal.lines() {
-        // Each line begins with its hash.
-        let record: Value = serde_json::from_str(line.split_once(' ').unwrap().1).unwrap();
+    for record in journal(&out) {
         let drawn = record["arms"][0]["result"]["Ok"]["parameters"]["brake-mps2"].as_f64().unwrap();
         assert!((5.0..=6.0).contains(&drawn), "{drawn}");
     }

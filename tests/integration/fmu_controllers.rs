@@ -7,8 +7,8 @@ use std::process::Command;
 
 use closecall_testing::has_python;
 
-use crate::native_controllers::{campaign, is_as_baseline, records};
-use crate::support::{ROOT, code, folder, headline_with, message, program, stderr, stdout};
+use crate::native_controllers::{campaign, is_as_baseline};
+use crate::support::{ROOT, code, folder, headline_with, message, program, records, stderr, stdout};
 
 /// Builds the FMU of the example, and returns the value of `--controller`.
 pub(crate) fn fmu(fmi: &str, to: &Path, options: &[&str]) -> String {

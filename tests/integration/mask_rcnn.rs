@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{closecall, code, folder, library, stderr};
+use crate::support::{closecall, code, folder, json_file, library, stderr};
 
 const PIPELINE: [&str; 2] = ["--set", "sensors.rear-camera.pipeline=mask-rcnn"];
 
@@ -143,7 +143,7 @@ fn the_study_characterises_it() {
         ["study", "sensors", scenario.to_str().unwrap(), "-n", "1", "--onnxruntime", library_file, "--out", out_text];
     let output = closecall(args.iter().chain(&PIPELINE).chain(&rare));
     assert_eq!(code(&output), 0, "{}", stderr(&output));
-    let study: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("sensors.json")).unwrap()).unwrap();
+    let study = json_file(&out.join("sensors.json"));
     let accuracy = |name: &str| {
         let of_case = |case: &&serde_json::Value| case["case"].as_str().is_some_and(|case| case.starts_with(name));
         let case = study["cases"].as_array().unwrap().iter().find(of_case).unwrap();

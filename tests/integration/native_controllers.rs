@@ -5,13 +5,11 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use closecall_campaign::folder::Folder;
 use closecall_campaign::record::Record;
 use closecall_scenarios::outcome::Outcome;
-use serde_json::Value;
 
 use crate::exec_controller::left_behind;
-use crate::support::{ROOT, code, folder, json, message, program, stderr, stdout};
+use crate::support::{ROOT, code, folder, json, json_file, message, program, records, stderr, stdout};
 
 /// Compiles a controller in C, and returns the library.
 pub(crate) fn compile(source: &str, to: &Path, options: &[&str]) -> PathBuf {
@@ -73,10 +71,6 @@ pub(crate) fn campaign_of(
         .args(["--out", out.to_str().unwrap()])
         .args(more);
     with_fault(&mut command, fault)
-}
-
-pub(crate) fn records(out: &Path) -> Vec<Record> {
-    Folder::open(out).records().unwrap().map(Result::unwrap).collect()
 }
 
 /// Returns an outcome with the name and the summary of the margin increase system of another: the
@@ -369,7 +363,7 @@ fn a_replay_needs_only_the_folder() {
     let library = compile("examples/acc_controller.c", &folder.path().join("acc.so"), &[]);
     let out = folder.path().join("out");
     stdout(&campaign(&lib(&library), &out, "2", None, &[]), 0);
-    let manifest: Value = serde_json::from_slice(&std::fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    let manifest = json_file(&out.join("manifest.json"));
     assert_eq!(manifest["arms"][1]["native"]["path"], library.to_str().unwrap());
     assert_eq!(manifest["controllers"][0]["identity"]["name"], "acc in C");
     let replay = program().args(["replay", out.to_str().unwrap(), "3"]).output().unwrap();

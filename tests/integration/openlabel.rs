@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use serde_json::{Value, json};
 
-use crate::support::{ROOT, closecall, code, folder, json as json_of, message, stdout};
+use crate::support::{ROOT, closecall, code, folder, json as json_of, json_file, message, stdout};
 
 /// Runs a command on trajectory data.
 fn traffic(command: &str, file: &Path, options: &[&str]) -> Output {
@@ -76,7 +76,7 @@ fn the_labels_say_what_changes_lanes_when_and_how_critical_it_is() {
     let folder = folder();
     let file = recorded("paper-figure", folder.path());
     let (results, path) = labelled("criticality", &file, &[], folder.path());
-    let text: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    let text = json_file(&path);
     let labels = &text["openlabel"];
     assert_eq!(labels["metadata"]["schema_version"], "1.0.0");
     let (change, action) = (&results[0], &labels["actions"]["0"]);
@@ -144,7 +144,7 @@ fn the_layout_makes_a_motorway_certain() {
     let Some(data) = closecall_testing::data() else { return };
     let folder = folder();
     let (_, path) = labelled("lane-changes", &data.join("highd_format_sample/01_tracks.csv"), &[], folder.path());
-    let text: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    let text = json_file(&path);
     let tags: Vec<&Value> = text["openlabel"]["tags"].as_object().unwrap().values().collect();
     let tag = |kind: &str| *tags.iter().find(|tag| tag["type"] == kind).unwrap();
     assert!(tag("RoadTypeMotorway").get("tag_data").is_none());

@@ -10,7 +10,7 @@ use closecall_testing::{has_python, python_with};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, library, message, stdout};
+use crate::support::{closecall, code, folder, json, json_file, library, message, stdout};
 
 /// The perception of the tests, with its kind of answers and its fault.
 const GROUPS: &str = "python3 tests/fixtures/perceptions/groups.py";
@@ -204,7 +204,7 @@ fn a_campaign_knows_its_perception_and_a_foreign_folder_does_not_run_it() {
         out.to_str().unwrap(),
     ];
     stdout(&closecall(args.clone()), 0);
-    let manifest: Value = serde_json::from_str(&std::fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
+    let manifest = json_file(&out.join("manifest.json"));
     let stated = &manifest["controllers"][0];
     assert_eq!(stated["identity"]["name"], "groups", "{manifest}");
     assert!(stated["command"].as_str().unwrap().starts_with("sensors.perception=exec:python3 "));
@@ -278,8 +278,7 @@ fn a_network_of_one_s_own_classifies_the_crops() {
         folder.path().to_str().unwrap(),
     ];
     stdout(&closecall(args), 0);
-    let text = std::fs::read_to_string(folder.path().join("manifest.json")).unwrap();
-    let manifest: Value = serde_json::from_str(&text).unwrap();
+    let manifest = json_file(&folder.path().join("manifest.json"));
     let models = manifest["models"].as_array().unwrap();
     let [shipped, own] = &models[..] else { panic!("{models:?}") };
     assert_eq!((&own["name"], &own["blake3"]), (&"sensors/models/rear-classifier.onnx".into(), &shipped["blake3"]));

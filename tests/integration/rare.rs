@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::{closecall, code, folder, json, message, stderr, stdout};
+use crate::support::{closecall, code, folder, json, json_file, message, stderr, stdout};
 
 /// The collision probability of the fixture, by construction.
 const TRUTH: f64 = 3.166_793e-5;
@@ -220,8 +220,7 @@ fn a_drawn_seed_is_stated_resumed_and_kept() {
     let words = format!("--design importance --event collision -n 3000 --judge-seed secret --out {}", out.display());
     let text = stdout(&rare(&words), 0);
     let seed: u64 = text.split("--seed ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap();
-    let result = fs::read_to_string(out.join("rare.json")).unwrap();
-    let result: serde_json::Value = serde_json::from_str(&result).unwrap();
+    let result = json_file(&out.join("rare.json"));
     assert_eq!(result["seed"], seed);
     assert!(result["closecall_version"].is_string());
     let resumed = stdout(&rare(&format!("{words} --resume")), 0);
@@ -255,8 +254,7 @@ fn a_search_finds_a_collision_that_is_rare_and_writes_its_smallest_case() {
     };
     let text = stdout(&run(&found, "--jobs 1"), 1);
     assert!(text.contains("a search states no probability"), "{text}");
-    let result: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(found.join("rare.json")).unwrap()).unwrap();
+    let result = json_file(&found.join("rare.json"));
     let report = &result["scenarios"][0];
     assert_eq!(report["search"]["has_event"], true);
     assert!(report["runs"].as_u64().unwrap() < 2_000, "{report}");

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::support::{code, folder, json, library, message, program, stderr, stdout};
+use crate::support::{code, folder, journal, json, json_file, library, message, program, stderr, stdout};
 
 const RESULTS: &str = "closecall-results";
 const PREVIOUS: &str = "closecall-results.previous";
@@ -52,8 +52,7 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 /// The number of samples that the manifest of a folder states.
 fn samples(folder: &Path) -> u64 {
-    let text = fs::read_to_string(folder.join("manifest.json")).unwrap();
-    serde_json::from_str::<serde_json::Value>(&text).unwrap()["sampling"]["samples"].as_u64().unwrap()
+    json_file(&folder.join("manifest.json"))["sampling"]["samples"].as_u64().unwrap()
 }
 
 #[test]
@@ -89,7 +88,6 @@ fn the_recorded_samples_are_those_with_the_largest_harm_of_their_kind() {
     let folder = folder();
     run(folder.path(), &[&CAMPAIGN[..], &["--seed", "1"]].concat());
     // The harm of both arms, from the journal itself.
-    let journal = fs::read_to_string(folder.path().join(RESULTS).join("journal.jsonl")).unwrap();
     let harm = |arm: &serde_json::Value| -> f64 {
         let mut worst = std::collections::BTreeMap::<String, f64>::new();
         for collision in arm["collisions"].as_array().unwrap() {
@@ -105,8 +103,7 @@ fn the_recorded_samples_are_those_with_the_largest_harm_of_their_kind() {
         collisions.flat_map(|actor| actor["between"].as_array().unwrap()).any(|actor| actor == "ego")
     };
     let mut worst = [(0.0, None); 2];
-    for line in journal.lines() {
-        let record: serde_json::Value = serde_json::from_str(line.split_once(' ').unwrap().1).unwrap();
+    for record in journal(&folder.path().join(RESULTS)) {
         let [acc, mis] = [0, 1].map(|arm| &record["arms"][arm]["result"]["Ok"]);
         let sample = record["sample"].as_u64();
         let no_collision = mis["collisions"].as_array().unwrap().is_empty();

@@ -8,7 +8,7 @@ use std::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, message, program, stdout};
+use crate::support::{closecall, code, folder, json, json_file, message, program, stdout};
 
 /// Fixes all parameters of the headline but four: few runs decide.
 const FIXED: [&str; 16] = [
@@ -84,7 +84,7 @@ fn a_study_is_the_same_on_any_number_of_threads_and_its_stages_agree() {
     let page = fs::read_to_string(out.join("sensitivity.html")).unwrap();
     assert!(page.contains("<svg") && !page.contains("<script") && !page.contains(" src="));
     assert!(fs::read_to_string(out.join("tornado-prevented.svg")).unwrap().contains("evasive-lateral-mps2"));
-    let kept: Value = serde_json::from_str(&fs::read_to_string(out.join("sensitivity.json")).unwrap()).unwrap();
+    let kept = json_file(&out.join("sensitivity.json"));
     assert_eq!(kept, study_json);
 }
 

@@ -4,6 +4,8 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use closecall_campaign::folder::Folder;
+use closecall_campaign::record::Record;
 use serde_json::Value;
 
 /// The folder of the repository.
@@ -101,6 +103,23 @@ pub(crate) fn words_of_gate(line: &str) -> &str {
 /// code than `expected`.
 pub(crate) fn json(output: &Output, expected: i32) -> Value {
     serde_json::from_str(&stdout(output, expected)).expect("the output is JSON")
+}
+
+/// Returns the JSON value of a file.
+pub(crate) fn json_file(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).expect("a file")).expect("the file is JSON")
+}
+
+/// Returns the records of a campaign's journal as JSON. A line is a checksum and a record.
+pub(crate) fn journal(out: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(out.join("journal.jsonl")).expect("a journal");
+    let record = |line: &str| serde_json::from_str(line.split_once(' ').expect("a checksum").1).expect("a record");
+    text.lines().map(record).collect()
+}
+
+/// Returns the records of a campaign's journal in the order of the samples.
+pub(crate) fn records(out: &Path) -> Vec<Record> {
+    Folder::open(out).records().expect("a journal").map(|record| record.expect("a record")).collect()
 }
 
 /// Creates a folder that is removed at the end of the test.

@@ -7,8 +7,8 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::native_controllers::{compile, lib, records, with_fault};
-use crate::support::{closecall, code, folder, message, program, stderr, stdout};
+use crate::native_controllers::{compile, lib, with_fault};
+use crate::support::{closecall, code, folder, message, program, records, stderr, stdout};
 
 const CAMPAIGN: [&str; 8] =
     ["campaign", "low-thw-overtake", "-n", "8", "--no-gate", "--sensors", "ground-truth", "--record=failures:0"];

@@ -21,7 +21,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::Side;
 
-use crate::support::{closecall, folder, json, library, stdout};
+use crate::support::{closecall, folder, json, json_file, library, stdout};
 
 /// Something that the commands of a controller must not depend on.
 #[derive(Clone, Copy)]
@@ -206,8 +206,7 @@ fn a_campaign_without_validity_checks_says_so_in_every_report() {
     for file in ["report.html", "junit.xml"] {
         assert!(std::fs::read_to_string(out.join(file)).unwrap().contains(sentence), "{file}");
     }
-    let manifest: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
+    let manifest = json_file(&out.join("manifest.json"));
     assert_eq!(manifest["checks"]["off"], true);
     let report = json(&closecall(scenario.iter().chain(&["--format", "json"])), 0);
     assert_eq!(report["checks"]["runs"], 0);

@@ -10,8 +10,8 @@ use serde_json::Value;
 
 use crate::exec_controller::left_behind;
 use crate::fmu_controllers::fmu;
-use crate::native_controllers::{campaign_of, compile, is_as_baseline, lib, records, with_fault};
-use crate::support::{ROOT, code, folder, json, program, stderr, stdout};
+use crate::native_controllers::{campaign_of, compile, is_as_baseline, lib, with_fault};
+use crate::support::{ROOT, code, folder, json, program, records, stderr, stdout};
 
 /// Faults that show from the second run of a process on: it crashes, or hangs. `wears-out` also
 /// crashes in every sample in which the ego is fast.

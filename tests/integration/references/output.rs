@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::documented::{document, hold, rows};
 use crate::native_controllers::compile;
-use crate::support::{ROOT, closecall, folder, json, library, stdout};
+use crate::support::{ROOT, closecall, folder, json, json_file, library, stdout};
 
 /// A list of objects as its objects.
 fn each(value: &Value) -> Vec<&Value> {
@@ -211,10 +211,8 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let shared = compile("examples/acc_controller.c", &folder.path().join("acc.so"), &[]);
     let native = format!("lib:{}", shared.display());
     program(&["campaign", headline, "-n", "2", "--no-gate", "--controller", &native, "--out", &at("lib")], 0);
-    let manifests = ["open", "exec", "part", "lib"].map(|name| {
-        let text = std::fs::read_to_string(folder.path().join(name).join("manifest.json")).unwrap();
-        serde_json::from_str::<Value>(&text).unwrap()
-    });
+    let manifests =
+        ["open", "exec", "part", "lib"].map(|name| json_file(&folder.path().join(name).join("manifest.json")));
     hold("manifest", &manifests);
 
     // Among the first eight samples the system prevents a collision, and induces none.
@@ -228,7 +226,7 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     hold("compare", [&fixed, &failing]);
     let baseline = at("baseline.json");
     stdout(&closecall(["baseline", "save", &at("mis"), &baseline]), 0);
-    let saved: Value = serde_json::from_str(&std::fs::read_to_string(&baseline).unwrap()).unwrap();
+    let saved = json_file(Path::new(&baseline));
     hold("baseline-file", [&saved]);
     hold("baseline", [&program(&["baseline", "compare", &at("acc"), &baseline], 1)]);
     hold("list", [&program(&["list"], 0)]);
