@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufReader, ErrorKind, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::atomic::WriteError;
@@ -112,13 +112,7 @@ impl AheadFile {
     /// Opens the file for appending, and cuts it to its first `keep` bytes. Creates it if there is
     /// none.
     pub(crate) fn open(path: &Path, keep: u64) -> Result<Self, WriteError> {
-        let fail = |source| WriteError::new(path, source);
-        let mut options = OpenOptions::new();
-        options.create(true).write(true).truncate(false);
-        let mut file = input::open_in_folder(path, &mut options).map_err(fail)?;
-        file.set_len(keep).map_err(fail)?;
-        file.seek(SeekFrom::End(0)).map_err(fail)?;
-        Ok(Self { file, path: path.to_owned() })
+        Ok(Self { file: journal::open_for_appending(path, keep)?, path: path.to_owned() })
     }
 
     /// Appends a sample, with a checksum as in the journal.

@@ -32,6 +32,17 @@ const CHECKSUM_DIGITS: usize = 16;
 /// 10,000 parameters each.
 const MOST_LINE_BYTES: u64 = 64 << 20;
 
+/// Opens a file for appending, and cuts it to its first `keep` bytes. Creates it if there is none.
+pub(crate) fn open_for_appending(path: &Path, keep: u64) -> Result<File, WriteError> {
+    let fail = |source| WriteError::new(path, source);
+    let mut options = OpenOptions::new();
+    options.create(true).write(true).truncate(false);
+    let mut file = input::open_in_folder(path, &mut options).map_err(fail)?;
+    file.set_len(keep).map_err(fail)?;
+    file.seek(SeekFrom::End(0)).map_err(fail)?;
+    Ok(file)
+}
+
 /// A journal that is open for appending.
 #[derive(Debug)]
 pub struct Journal {
@@ -47,12 +58,7 @@ impl Journal {
     /// # Errors
     /// [`WriteError`] if the file cannot be created or cut.
     pub fn open(path: &Path, keep: u64) -> Result<Self, WriteError> {
-        let fail = |source| WriteError::new(path, source);
-        let mut options = OpenOptions::new();
-        options.create(true).write(true).truncate(false);
-        let mut file = input::open_in_folder(path, &mut options).map_err(fail)?;
-        file.set_len(keep).map_err(fail)?;
-        file.seek(SeekFrom::End(0)).map_err(fail)?;
+        let file = open_for_appending(path, keep)?;
         Ok(Self { file, path: path.to_owned(), synced: Instant::now() })
     }
 
