@@ -7,12 +7,12 @@
 
 use closecall_traffic::maths;
 use nalgebra::Vector3;
-use rerun::{Mesh3D, Transform3D};
+use rerun::Mesh3D;
 
 use super::RecordingError;
 use super::palette;
 use super::stream::Writer;
-use super::vehicles::yaw_rotation;
+use super::vehicles::write_poses;
 use crate::run::film::{Film, Frame};
 
 /// Extinction over the visibility: -ln(0.02).
@@ -60,12 +60,5 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         let ego = &frame.states[film.ego];
         film.road.plane_pose(ego.s_m, 0.0, 0.0)
     };
-    let poses: Vec<_> = film.frames.iter().map(along).collect();
-    writer.write_rows("world/fog", &film.times(), |range| {
-        let poses = &poses[range];
-        Transform3D::update_fields()
-            .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
-            .with_many_quaternion(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
-            .columns_of_unit_batches()
-    })
+    write_poses(writer, "world/fog", &film.times(), &film.frames.iter().map(along).collect::<Vec<_>>())
 }

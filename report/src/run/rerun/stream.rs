@@ -122,13 +122,17 @@ impl<'a> Writer<'a> {
         times: &[Time],
         build: impl BuildColumns,
     ) -> Result<(), RecordingError> {
-        let until_critical = times.partition_point(|&time| time <= self.critical);
-        if let Some(shown) = until_critical.checked_sub(1) {
-            let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
-            self.recording.send_columns(self.path(entity), self.copy_time(), columns)?;
-            self.clear_copy(entity, times[0])?;
-        }
+        self.copy_critical_row(entity, times, &build)?;
         self.write_curve(entity, times, build)
+    }
+
+    /// Writes a copy of the row that holds at the critical moment.
+    fn copy_critical_row(&self, entity: &str, times: &[Time], build: &impl BuildColumns) -> Result<(), RecordingError> {
+        let until_critical = times.partition_point(|&time| time <= self.critical);
+        let Some(shown) = until_critical.checked_sub(1) else { return Ok(()) };
+        let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
+        self.recording.send_columns(self.path(entity), self.copy_time(), columns)?;
+        self.clear_copy(entity, times[0])
     }
 
     /// Writes rows like [`Self::write_rows`], in pieces of at most `piece` rows, for rows of many
@@ -140,12 +144,7 @@ impl<'a> Writer<'a> {
         piece: usize,
         build: impl BuildColumns,
     ) -> Result<(), RecordingError> {
-        let until_critical = times.partition_point(|&time| time <= self.critical);
-        if let Some(shown) = until_critical.checked_sub(1) {
-            let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
-            self.recording.send_columns(self.path(entity), self.copy_time(), columns)?;
-            self.clear_copy(entity, times[0])?;
-        }
+        self.copy_critical_row(entity, times, &build)?;
         (0..times.len()).step_by(piece).try_for_each(|first| {
             let rows = first..(first + piece).min(times.len());
             let columns = build(rows.clone()).map_err(RecordingStreamError::from)?;

@@ -2,7 +2,7 @@
 //! the ego.
 
 use closecall_traffic::geometry::BoxSide;
-use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState, maths};
+use closecall_traffic::{Dimensions, Indicator, Measured, PlanePose, Road, Time, VehicleClass, VehicleState, maths};
 use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 
 use super::RecordingError;
@@ -107,14 +107,7 @@ fn write_rig(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Rec
         let s_m = ego.s_m - (RIG_SHARE * gap_m).clamp(0.0, MAX_RIG_M);
         film.road.plane_pose(s_m, 0.5 * film.road.right_edge_m(), 0.0)
     };
-    let poses: Vec<_> = film.frames.iter().map(pose).collect();
-    writer.write_rows("world/rig", times, |range| {
-        let poses = &poses[range];
-        Transform3D::update_fields()
-            .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
-            .with_many_quaternion(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
-            .columns_of_unit_batches()
-    })
+    write_poses(writer, "world/rig", times, &film.frames.iter().map(pose).collect::<Vec<_>>())
 }
 
 fn write_motion(
@@ -125,6 +118,16 @@ fn write_motion(
     road: &Road,
 ) -> Result<(), RecordingError> {
     let poses: Vec<_> = states.iter().map(|state| road.plane_pose(state.s_m, state.d_m, state.heading_rad)).collect();
+    write_poses(writer, entity, times, &poses)
+}
+
+/// Writes the pose of an entity at each of these times.
+pub(super) fn write_poses(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    poses: &[PlanePose],
+) -> Result<(), RecordingError> {
     writer.write_rows(entity, times, |range| {
         let poses = &poses[range];
         Transform3D::update_fields()
