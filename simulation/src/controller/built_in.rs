@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver, R157Fuzzy, Slower, Slowing};
+use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver, R157Fuzzy, Slower, Slowing, StackPatch};
 
 use super::{Functions, TimeGap};
 use crate::run::ControllerFactory;
@@ -118,14 +118,16 @@ impl BuiltIn {
 
     /// Returns a factory of this controller.
     pub fn factory(self) -> Arc<dyn ControllerFactory> {
-        Arc::new(BuiltInFactory { name: self.to_string(), built_in: self })
+        Arc::new(BuiltInFactory { name: self.to_string(), built_in: self, patch: None })
     }
 }
 
 /// Creates a built-in controller for each run.
-struct BuiltInFactory {
-    name: String,
-    built_in: BuiltIn,
+pub(super) struct BuiltInFactory {
+    pub(super) name: String,
+    pub(super) built_in: BuiltIn,
+    /// Settings of the arm alone.
+    pub(super) patch: Option<StackPatch>,
 }
 
 impl ControllerFactory for BuiltInFactory {
@@ -138,7 +140,8 @@ impl ControllerFactory for BuiltInFactory {
     }
 
     fn settings(&self, settings: &EgoSettings) -> EgoSettings {
-        self.built_in.settings(settings)
+        let settings = self.built_in.settings(settings);
+        self.patch.as_ref().map_or(settings, |patch| settings.patched(patch))
     }
 
     fn has_mis(&self, settings: &EgoSettings) -> bool {

@@ -6,9 +6,10 @@
 use std::fmt;
 use std::sync::Arc;
 
-use closecall_controllers::{EgoController, EgoSettings, StackPatch};
+use closecall_controllers::StackPatch;
 
 use super::BuiltIn;
+use super::built_in::BuiltInFactory;
 use crate::run::ControllerFactory;
 
 /// Separates the controller and its settings.
@@ -78,7 +79,8 @@ impl Tuned {
     /// Returns a factory of this controller.
     pub(super) fn factory(&self) -> Arc<dyn ControllerFactory> {
         // The settings were read before.
-        Arc::new(TunedFactory { name: self.to_string(), base: self.base, patch: self.patch().unwrap_or_default() })
+        let patch = self.patch().ok();
+        Arc::new(BuiltInFactory { name: self.to_string(), built_in: self.base, patch })
     }
 }
 
@@ -86,38 +88,6 @@ impl fmt::Display for Tuned {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.base)?;
         self.settings.iter().try_for_each(|setting| write!(f, "{SEPARATOR}{setting}"))
-    }
-}
-
-struct TunedFactory {
-    name: String,
-    base: BuiltIn,
-    patch: StackPatch,
-}
-
-impl ControllerFactory for TunedFactory {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn is_built_in(&self) -> bool {
-        true
-    }
-
-    fn settings(&self, settings: &EgoSettings) -> EgoSettings {
-        self.base.settings(settings).patched(&self.patch)
-    }
-
-    fn has_mis(&self, settings: &EgoSettings) -> bool {
-        self.settings(settings).mis().is_some()
-    }
-
-    fn looks_back(&self, settings: &EgoSettings) -> bool {
-        self.has_mis(settings)
-    }
-
-    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
-        self.base.controller(self.settings(settings))
     }
 }
 
