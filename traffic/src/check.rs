@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::suggest::hint;
-use crate::{Absent, ParameterName, Parameters};
+use crate::{ParameterName, Parameters};
 
 /// A configuration as written in a file, which can be checked into a value that cannot be invalid.
 pub trait Check {
@@ -117,9 +117,6 @@ pub enum Problem {
         /// The rule that must hold between the two values.
         rule: String,
     },
-    /// A value that is derived from others does not exist.
-    #[error("cannot be worked out: {0}")]
-    Undefined(Absent),
 }
 
 /// The error for a key with a wrong value.
