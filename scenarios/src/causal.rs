@@ -296,7 +296,6 @@ mod tests {
             group: SensorGroup::Rear,
             sensor: "rear LiDAR".to_owned(),
             effects: "dead".to_owned(),
-            has_ghost: false,
             from_s,
             until_s: f64::INFINITY,
         };

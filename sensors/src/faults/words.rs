@@ -30,8 +30,6 @@ pub struct StatedFault {
     pub sensor: String,
     /// Its fault.
     pub effects: String,
-    /// Whether a track without a vehicle is among the effects.
-    pub has_ghost: bool,
     /// Time of its begin (s); negative infinity if it holds from the start on.
     pub from_s: f64,
     /// Time of its end (s); infinity if it holds to the end.
@@ -96,7 +94,7 @@ impl Faults {
             let [from_s, until_s] = self.odometry.span_s();
             let effects = self.odometry.effects().join(", ");
             let (group, sensor) = (SensorGroup::Odometry, "odometry and map".to_owned());
-            stated.push(StatedFault { group, sensor, effects, has_ghost: false, from_s, until_s });
+            stated.push(StatedFault { group, sensor, effects, from_s, until_s });
         }
         stated
     }
@@ -109,11 +107,6 @@ trait Effects {
         None
     }
 
-    /// Returns whether a track without a vehicle is among the effects.
-    fn has_ghost(&self) -> bool {
-        false
-    }
-
     /// Returns the effects in words.
     fn effects(&self) -> Vec<String>;
 }
@@ -124,7 +117,6 @@ fn state<T: Effects + Combine>(stated: &mut Vec<StatedFault>, list: &FaultList<T
         group,
         sensor: effect.of_sensor().map_or_else(|| name.to_owned(), |sensor| format!("{name} `{sensor}`")),
         effects: effect.effects().join(", "),
-        has_ghost: effect.has_ghost(),
         from_s,
         until_s,
     }));
@@ -184,10 +176,6 @@ impl Effects for CameraFault {
 }
 
 impl Effects for ObjectFault {
-    fn has_ghost(&self) -> bool {
-        self.ghost.is_some()
-    }
-
     fn effects(&self) -> Vec<String> {
         let ghost = self.ghost.map_or_else(String::new, |[gap_m, _]| {
             format!("reports a ghost {gap_m:.0} m away, a vehicle that does not exist")
