@@ -18,6 +18,11 @@ use crate::support::{closecall, folder, library, stdout};
 /// The number of samples of each distribution.
 const SAMPLES: u64 = 300;
 
+/// An ego far behind the vehicles of a test, in another lane.
+const DISTANT_EGO: &str = "[[actor]]\nid = \"ego\"\nvehicle = { class = \"car\" }\n\
+                           start = { absolute = { lane = 1, s-m = -900.0, speed-mps = 20.0 } }\n\
+                           driver = { ego-stack = { acc = { time-gap-s = 1.0 } } }\n";
+
 /// Significance level of the Kolmogorov–Smirnov tests.
 const LEVEL: f64 = 0.01;
 
@@ -220,11 +225,8 @@ fn the_headway_at_the_crossing_of_the_marking_follows_the_distribution_of_the_sc
 fn traced(actors: &str, duration_s: f64) -> BTreeMap<String, Vec<Row>> {
     let folder = folder();
     let (path, trace) = (folder.path().join("drivers.toml"), folder.path().join("trace.csv"));
-    let ego = "[[actor]]\nid = \"ego\"\nvehicle = { class = \"car\" }\n\
-               start = { absolute = { lane = 1, s-m = -900.0, speed-mps = 20.0 } }\n\
-               driver = { ego-stack = { acc = { time-gap-s = 1.0 } } }\n";
     let road = ROAD.replace("duration-s = 20.0", &format!("duration-s = {duration_s}"));
-    std::fs::write(&path, format!("{road}{actors}{ego}")).unwrap();
+    std::fs::write(&path, format!("{road}{actors}{DISTANT_EGO}")).unwrap();
     let path = path.to_str().unwrap();
     stdout(&closecall(["check", path]), 0);
     stdout(
@@ -331,11 +333,8 @@ fn a_loaded_scenario_holds_the_track_of_a_recorded_vehicle_and_no_longer_needs_t
         0,
     );
     let actors = pair("{ recorded = { file = \"own.csv\", track-id = 1 } }", "{ wiedemann99 = {} }");
-    let ego = "[[actor]]\nid = \"ego\"\nvehicle = { class = \"car\" }\n\
-               start = { absolute = { lane = 1, s-m = -900.0, speed-mps = 20.0 } }\n\
-               driver = { ego-stack = { acc = { time-gap-s = 1.0 } } }\n";
     let path = folder.path().join("scenario.toml");
-    let text = format!("{ROAD}{actors}{ego}");
+    let text = format!("{ROAD}{actors}{DISTANT_EGO}");
     std::fs::write(&path, &text).unwrap();
     let file = ScenarioFile::load(&path, &[]).unwrap();
     assert!(file.text().contains("profile") && !file.text().contains("recorded"), "{}", file.text());

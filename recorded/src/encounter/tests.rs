@@ -12,11 +12,12 @@ fn rear() -> Trajectory {
     changing_track(3, (0.0, 30.0), (-5.25, -1.75), (10.0, 5.0), 200)
 }
 
-fn encounter_among(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
+/// Returns the encounter of the rear vehicle, track 3, among other vehicles.
+fn encounter_among(others: Vec<Trajectory>, lead: Lead) -> Result<RecordedEncounter, NoEncounter> {
     let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
     let changes = detect(&data);
     let change = changes.iter().find(|change| change.track_id == 3).unwrap();
-    encounter(&data, change, &changes, (CONTROL_STEP, Lead::Required))
+    encounter(&data, change, &changes, (CONTROL_STEP, lead))
 }
 
 /// Ego and lead vehicle, 30 m apart.
@@ -26,7 +27,7 @@ fn ego_and_lead() -> Vec<Trajectory> {
 
 #[test]
 fn roles_clock_and_road_are_assigned() {
-    let encounter = encounter_among(ego_and_lead()).unwrap();
+    let encounter = encounter_among(ego_and_lead(), Lead::Required).unwrap();
     assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
     assert_eq!((encounter.start, encounter.lanes, encounter.home, encounter.target), (Time::ZERO, 2, Lane(2), Lane(1)));
     let [ego, _, rear] = encounter.ego_lead_rear();
@@ -46,7 +47,7 @@ fn the_encounter_starts_once_the_ego_follows_the_lead() {
     // Until 5 s another vehicle drives between the ego and the lead vehicle.
     let mut between = straight_track(4, 165.0, 20.0, -5.25, 50);
     between.points.retain(|point| point.time < Time::from_s(5.0));
-    let encounter = encounter_among(ego_and_lead().into_iter().chain([between]).collect()).unwrap();
+    let encounter = encounter_among(ego_and_lead().into_iter().chain([between]).collect(), Lead::Required).unwrap();
     assert!((encounter.start.s() - 5.0).abs() < 0.5, "{}", encounter.start);
     assert_eq!(encounter.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
 }
@@ -56,7 +57,7 @@ fn vehicles_of_another_carriageway_are_left_out() {
     let mut far = straight_track(5, 150.0, 20.0, -1_005.25, 250);
     far.points.iter_mut().for_each(|point| point.lane = Lane(4));
     let near = straight_track(6, 150.0, 20.0, -1.75, 250);
-    let encounter = encounter_among(ego_and_lead().into_iter().chain([far, near]).collect()).unwrap();
+    let encounter = encounter_among(ego_and_lead().into_iter().chain([far, near]).collect(), Lead::Required).unwrap();
     let tracks: Vec<u64> = encounter.vehicles.iter().map(|vehicle| vehicle.trajectory.track_id).collect();
     assert_eq!((tracks, encounter.lanes), (vec![1, 2, 3, 6], 2));
 }
@@ -84,7 +85,7 @@ fn a_road_is_one_carriageway_of_several_with_markings() {
 
 #[test]
 fn a_lane_change_that_is_no_encounter_states_the_reason() {
-    let message = |others| encounter_among(others).unwrap_err().to_string();
+    let message = |others| encounter_among(others, Lead::Required).unwrap_err().to_string();
     assert!(message(Vec::new()).contains("no vehicle is ahead of track 3 in lane 2"));
     assert!(
         message(ego_and_lead()[..1].to_vec())
@@ -148,17 +149,9 @@ fn without_a_margin_system_no_lead_vehicle_is_required() {
     assert_eq!(unknown, ChoiceError::NoLaneChange { is_recorded: false, others: vec![3] });
 }
 
-/// Returns the encounter of track 3 without a lead vehicle.
-fn sampled_among(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
-    let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
-    let changes = detect(&data);
-    let change = changes.iter().find(|change| change.track_id == 3).unwrap();
-    encounter(&data, change, &changes, (CONTROL_STEP, Lead::LeftOut))
-}
-
 #[test]
 fn without_a_vehicle_ahead_there_is_an_encounter_without_an_ego_vehicle() {
-    let encounter = sampled_among(Vec::new()).unwrap();
+    let encounter = encounter_among(Vec::new(), Lead::LeftOut).unwrap();
     assert_eq!((encounter.overtaken_index(), encounter.roles(), encounter.vehicles.len()), (None, 1, 1));
     assert_eq!((encounter.start, encounter.rear().trajectory.points[0].s_m.abs() < 1e-6), (Time::ZERO, true));
     assert_eq!(encounter.crossing_thw_s, Err(closecall_traffic::Absent::NoLead));
@@ -167,10 +160,10 @@ fn without_a_vehicle_ahead_there_is_an_encounter_without_an_ego_vehicle() {
 #[test]
 fn a_vehicle_ahead_may_be_far_or_leave_the_record_before_the_crossing() {
     let far = straight_track(1, 600.0, 20.0, -5.25, 250);
-    assert!(sampled_among(vec![far]).is_ok());
+    assert!(encounter_among(vec![far], Lead::LeftOut).is_ok());
     let mut leaves = straight_track(1, 150.0, 20.0, -5.25, 250);
     leaves.points.retain(|point| point.time < Time::from_s(11.5));
-    let encounter = sampled_among(vec![leaves]).unwrap();
+    let encounter = encounter_among(vec![leaves], Lead::LeftOut).unwrap();
     assert!(encounter.crossing > Time::from_s(12.0) && encounter.overtaken_index() == Some(1));
 }
 
@@ -179,7 +172,7 @@ fn the_encounter_starts_with_the_record_of_the_vehicle_ahead_and_needs_two_secon
     let since = |since_s: f64| {
         let mut ahead = straight_track(1, 150.0, 20.0, -5.25, 250);
         ahead.points.retain(|point| point.time >= Time::from_s(since_s));
-        sampled_among(vec![ahead])
+        encounter_among(vec![ahead], Lead::LeftOut)
     };
     assert_eq!(since(6.0).unwrap().start, Time::from_s(6.0));
     // A vehicle that appears after the start of the lane change is not ahead at its start.

@@ -103,12 +103,24 @@ fn sumo_table(separator: &str, has_prefix: bool) -> String {
     text
 }
 
+/// Returns the lanes in which each vehicle is in its first and in its last frame.
+fn first_and_last_lanes(data: &TrajectoryData) -> Vec<(u8, u8)> {
+    data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect()
+}
+
+/// Asserts that one vehicle changes lanes, number 2 to the left, and returns when it crosses the
+/// marking (s).
+fn assert_one_lane_change(data: &TrajectoryData) -> f64 {
+    let changes = detect(&smooth(data));
+    let [change] = &changes[..] else { panic!("{}", changes.len()) };
+    assert_eq!((change.track_id, change.direction), (2, Side::Left));
+    change.crossing_s
+}
+
 /// Asserts that the made-up road was read as it is.
 fn assert_is_made_up_road(data: &TrajectoryData) {
     assert_eq!((data.layout, data.period), (Layout::Sumo, Time::from_ms(100)));
-    let lanes: Vec<(u8, u8)> =
-        data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect();
-    assert_eq!(lanes, [(1, 1), (3, 2), (3, 3), (2, 2)], "SUMO counts its lanes from the right");
+    assert_eq!(first_and_last_lanes(data), [(1, 1), (3, 2), (3, 3), (2, 2)], "SUMO counts its lanes from the right");
     assert!((data.markings.typical_lane_width_m() - SUMO_LANE_M).abs() < 0.01);
     let truck = &data.trajectories[2];
     assert_eq!((truck.class, truck.dimensions.length_m), (VehicleClass::Truck, 16.5));
@@ -116,10 +128,8 @@ fn assert_is_made_up_road(data: &TrajectoryData) {
     let apart_m = truck.points[0].s_m - data.trajectories[1].points[0].s_m;
     assert!((apart_m - (30.0 - 0.5 * (16.5 - 5.0))).abs() < 0.01, "{apart_m}");
     assert!(data.notes.iter().any(|note| note.contains("`f.0` is 1")), "{:?}", data.notes);
-    let changes = detect(&smooth(data));
-    let [change] = &changes[..] else { panic!("{}", changes.len()) };
-    assert_eq!((change.track_id, change.direction), (2, Side::Left));
-    assert!((change.crossing_s - 6.0).abs() < 0.15, "{}", change.crossing_s);
+    let crossing_s = assert_one_lane_change(data);
+    assert!((crossing_s - 6.0).abs() < 0.15, "{crossing_s}");
 }
 
 #[test]
@@ -366,15 +376,15 @@ fn vehicle_records_of_vissim_are_read_by_links_and_by_coordinates() {
     for text in [vissim_by_link(), vissim_across(|across| 1.0 - across), vissim_by_coordinates()] {
         let data = read_text(text.as_bytes()).unwrap();
         assert_eq!((data.layout, data.period), (Layout::Vissim, Time::from_ms(100)));
-        let lanes: Vec<(u8, u8)> =
-            data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect();
-        assert_eq!(lanes, [(1, 1), (3, 2), (3, 3), (2, 2)], "Vissim counts its lanes from the right");
+        assert_eq!(
+            first_and_last_lanes(&data),
+            [(1, 1), (3, 2), (3, 3), (2, 2)],
+            "Vissim counts its lanes from the right"
+        );
         assert_eq!(data.trajectories[2].class, VehicleClass::Truck);
         assert!((data.trajectories[0].points[5].speed_mps - 32.0).abs() < 0.01, "km/h");
-        let changes = detect(&smooth(&data));
-        let [change] = &changes[..] else { panic!("{}", changes.len()) };
-        assert_eq!((change.track_id, change.direction), (2, Side::Left));
-        assert!((change.crossing_s - 6.0).abs() < 0.2, "{}", change.crossing_s);
+        let crossing_s = assert_one_lane_change(&data);
+        assert!((crossing_s - 6.0).abs() < 0.2, "{crossing_s}");
     }
 }
 
@@ -390,9 +400,7 @@ fn lanes_of_vissim_beside_coordinates_are_the_recorded_lanes() {
             format!("{link};{};{speed_kmh:.3};{front_m:.3};{y_m:.3};{rear_m:.3};{y_m:.3}", index + 1)
         });
     let data = read_text(text.as_bytes()).unwrap();
-    let lanes: Vec<(u8, u8)> =
-        data.trajectories.iter().map(|track| (track.points[0].lane.0, track.points[119].lane.0)).collect();
-    assert_eq!(lanes, [(1, 1), (3, 2), (3, 3), (2, 2)]);
+    assert_eq!(first_and_last_lanes(&data), [(1, 1), (3, 2), (3, 3), (2, 2)]);
     let points = &data.trajectories[1].points;
     let change = points.windows(2).position(|pair| pair[0].lane != pair[1].lane);
     assert!(change.is_some_and(|frame| (64..=65).contains(&frame)), "{change:?}");
@@ -415,9 +423,7 @@ fn mirrored_files_of_sumo_and_vissim_are_refused_and_the_named_options_mend_them
         let problem = read_text(text.as_bytes()).unwrap_err().problem;
         assert!(matches!(problem, TrajectoryFileProblem::IndexAgainstPosition { .. }), "{problem}");
         let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
-        let changes = detect(&smooth(&tracks.and_then(|tracks| tracks.collect_all()).unwrap()));
-        let [change] = &changes[..] else { panic!("{}", changes.len()) };
-        assert_eq!((change.track_id, change.direction), (2, Side::Left));
+        assert_one_lane_change(&tracks.and_then(|tracks| tracks.collect_all()).unwrap());
     }
     // The options do not pass on a file that is as it should be.
     assert!(open_from(sumo_xml(false).as_bytes(), Path::new("a"), options, usize::MAX).is_err());
@@ -435,9 +441,7 @@ fn coordinates_of_vissim_in_feet_are_read_as_their_comments_state() {
     let units = "* POS: Position [m]\n* COORDFRONT: Front [ft]\n* COORDREAR: Rear [ft]\n";
     let data = read_text(in_feet.replace("* POS: Position [m]\n", units).as_bytes()).unwrap();
     assert!((data.trajectories[0].dimensions.length_m - 5.0).abs() < 0.01);
-    let changes = detect(&smooth(&data));
-    let [change] = &changes[..] else { panic!("{}", changes.len()) };
-    assert_eq!((change.track_id, change.direction), (2, Side::Left));
+    assert_one_lane_change(&data);
     assert!(read_text(in_feet.as_bytes()).is_err(), "as metres, the speeds contradict the positions");
 }
 
