@@ -1,10 +1,10 @@
-//! Whether what the ego does is an answer to the vehicles behind it.
+//! Whether the ego slows down because of the vehicles behind it.
 //!
-//! Whoever is slower has a longer gap ahead, and prevents collisions without looking back. Such an
-//! ego also slows down if nobody is behind. In scenarios with the requirement `MIS-9`, some samples
-//! therefore run again without the vehicles that start behind the ego, while nothing happens ahead.
-//! An ego that slows down there by more than it does with the baseline misses the requirement,
-//! whenever it begins to.
+//! An ego that is always slower has a longer gap ahead, and prevents collisions without looking
+//! back. Such an ego also slows down if nobody is behind. In scenarios with the requirement `MIS-9`,
+//! some samples therefore run again without the vehicles that start behind the ego, while nothing
+//! happens ahead. If the ego slows down in such a run by more than the baseline does, it misses the
+//! requirement. The time at which it begins to slow down does not matter.
 
 use closecall_simulation::RunKey;
 use closecall_traffic::statistics::format::percent;
@@ -46,7 +46,7 @@ pub struct Attribution {
 }
 
 impl Attribution {
-    /// Adds a run, and the one of the baseline if there is one.
+    /// Adds a run, beside the run of the baseline if there is a baseline.
     pub fn push(&mut self, run: NobodyBehind, baseline: Option<NobodyBehind>) {
         self.runs += 1;
         self.slowed += u64::from(run.is_slowed(baseline));
@@ -60,8 +60,8 @@ impl Attribution {
         self.most_mps = self.most_mps.max(other.most_mps);
     }
 
-    /// Returns true if the ego slows down without a vehicle behind in more runs than it may: the
-    /// one-sided lower bound of their share lies above the allowed one.
+    /// Returns true if the ego slows down without a vehicle behind in too many runs: the one-sided
+    /// lower bound of their share is above the allowed share.
     pub fn is_missed(&self) -> bool {
         lower_bound(self.slowed, self.runs, CONFIDENCE) > MOST
     }

@@ -28,8 +28,8 @@ pub enum CampaignError {
     /// The worker threads could not be started.
     #[error(transparent)]
     Workers(#[from] WorkersError),
-    /// A worker process has found another controller, cannot read it, or is another version of this
-    /// program.
+    /// A worker process has found another controller, cannot read the controller, or is another
+    /// version of this program.
     #[error("failed to go on: {reason}")]
     Refused {
         /// The reason.

@@ -186,15 +186,14 @@ impl Campaign {
         self.works.iter().all(|work| work.samples(self.partition).next().is_none())
     }
 
-    /// Runs samples before their turn: those that failed in an earlier campaign, in the order of
-    /// the plan, up to 10,000 of them. Samples that the folder's journal holds do not run again,
-    /// nor do those that an interrupted campaign has run before their turn.
+    /// Runs samples before their turn: up to 10,000 samples that failed in an earlier campaign, in
+    /// the order of the plan. A sample does not run again if the folder's journal has its record, or
+    /// if an interrupted campaign has run it before its turn.
     ///
-    /// `on_record` receives every record, those of the interrupted campaign first. If it breaks,
-    /// the campaign ends after that record: [`Self::run_after`] then runs no sample.
+    /// `on_record` receives every record, first the records of the interrupted campaign. If it
+    /// breaks, the campaign ends after that record: [`Self::run_after`] then runs no sample.
     ///
-    /// Returns the results. They wait for their turn, so that the journal has the order of the
-    /// plan.
+    /// Returns the results. They wait for their turn: the journal has the order of the plan.
     ///
     /// # Errors
     /// [`CampaignError`] if the folder cannot be read or written, or no threads can be started.
@@ -396,8 +395,9 @@ impl Campaign {
         })
     }
 
-    /// Runs the samples from `start` on, and passes on each of them in its turn, those of `ahead`
-    /// included. Returns true if nothing has ended the campaign before its last sample.
+    /// Runs the samples from `start` on, and passes on the record of each sample in its turn. The
+    /// samples of `ahead` have run, and only pass on their records. Returns true if nothing has
+    /// ended the campaign before its last sample.
     fn run_from(
         &self,
         start: Position,

@@ -191,7 +191,7 @@ const fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
-/// Keys of a manifest that do not affect the outcomes, or whose differences are worded elsewhere.
+/// Keys of a manifest that do not affect the outcomes, or whose differences another message names.
 const INCIDENTAL: [&str; 4] = ["command", "working_folder", "replaceable", "controllers"];
 /// Keys of a scenario in a manifest that do not affect the outcomes, which follow from its text.
 const INCIDENTAL_OF_SCENARIO: [&str; 2] = ["path", "settings"];

@@ -1,8 +1,8 @@
-//! The Mask R-CNN in this process and in Python's ONNX Runtime finds the same in the same images,
-//! and other networks are refused.
+//! The Mask R-CNN finds the same vehicles in this process and in Python's ONNX Runtime, and other
+//! networks are refused.
 //!
-//! Needs the shared library of the `onnxruntime` wheel. Python was given whole images, and Rust the
-//! pixels that the network reads.
+//! The tests need the shared library of the `onnxruntime` wheel. Python got whole images; Rust gets
+//! only the pixels that the network reads.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 

@@ -21,8 +21,8 @@
 //! seeds here.
 //!
 //! The tracker does not know the scenario, so it can only be consistent over the whole library. The
-//! validation therefore fails (exit code 1) if the line `all of them` of a sensor mode is
-//! overconfident or undecided. In single scenarios, the tracker is conservative if no driver weaves
+//! validation therefore fails (exit code 1) if a sensor mode is overconfident or undecided in the
+//! line `all of them`. In single scenarios, the tracker is conservative if no driver weaves
 //! (`paper-figure`, `overtake-without-brake`), and somewhat overconfident if the rear vehicle only
 //! follows closely (`rear-follower-stays`).
 #![expect(clippy::print_stdout, reason = "a validation prints its result")]

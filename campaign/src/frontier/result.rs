@@ -49,8 +49,8 @@ pub struct Point {
     /// Mean over the samples of the largest speed deficit to the lead vehicle, less the deficit in
     /// the baseline (m/s); `None` for fewer than two samples.
     pub speed_lost_mps: Option<Estimate>,
-    /// True if no other combination is better in one of prevented, induced and speed lost, and at
-    /// least as good in the others.
+    /// True if the combination is Pareto-optimal: no other combination is better in one of
+    /// prevented, induced and speed lost, and at least as good in the other two.
     pub is_optimal: bool,
 }
 

@@ -28,15 +28,16 @@
 //!   deceleration itself is perceived only gradually, from the change of speed. Until then, a
 //!   driver who sees the brake light go on assumes a moderate deceleration.
 //! - *Second leader.* A driver also sees the next vehicle beyond the vehicle ahead: through the
-//!   windows of a car, past a motorcycle, and behind a truck only where its rear reaches past the
-//!   truck. The driver perceives position and speed of the second leader as of the vehicle ahead.
+//!   windows of a car, and past a motorcycle. Beyond a truck, the driver sees a vehicle only if its
+//!   rear reaches past the truck's side. The driver perceives the second leader in the same way as
+//!   the vehicle ahead.
 //!   Once the driver perceives the brake light of the second leader, it expects the vehicle ahead
 //!   to brake (spatial anticipation; Treiber, Kesting and Helbing 2006). The sensitivity to the
 //!   second leader is half of the sensitivity to the vehicle ahead (Hoogendoorn and Ossen 2006; see
 //!   [`PerceptionConfig`]).
 //! - *Leader that leaves.* A lane change takes seconds, and the driver foresees its end. Once the
-//!   vehicle ahead is out of the lane, the driver reacts to the next vehicle at once, with its
-//!   knowledge of that vehicle, if that vehicle was in view one reaction time ago.
+//!   vehicle ahead is out of the lane, the driver reacts to the next vehicle at once, if that vehicle
+//!   was in view one reaction time ago. The driver then uses what it knows of that vehicle.
 //! - *Evidence.* A driver may accumulate looming evidence instead of using the threshold and the
 //!   brake light: see [`evidence`].
 
@@ -298,8 +299,9 @@ struct Extrapolation {
 }
 
 impl Extrapolation {
-    /// Perceived speed of a vehicle in the adjacent lane (m/s): its own, or the driver's if no
-    /// difference is noticed. The driver looks there too briefly to attend to a difference.
+    /// Returns the perceived speed of a vehicle in the adjacent lane (m/s): the true speed, or the
+    /// driver's own speed if the driver notices no difference. The driver looks there too briefly to
+    /// attend to a difference.
     fn adjacent_speed_mps(&self, observed: &ObservedVehicle) -> f64 {
         let notices = observed.visual_angle_rate_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
         if notices { observed.speed_mps } else { self.own_speed_then_mps }

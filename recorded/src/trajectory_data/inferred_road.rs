@@ -507,8 +507,8 @@ fn in_order(fit: &LateralFit<i64>, lane_width_m: f64) -> BTreeMap<i64, f64> {
     middles_m
 }
 
-/// Returns the doubt about lanes whose vehicles are spread over more than a lane. If too few vehicles
-/// show how the reference line weaves, there is none.
+/// Returns the doubt about lanes whose vehicles are spread over more than the width of a lane.
+/// Returns no doubt if too few vehicles show how the reference line weaves.
 fn spread(positions: &LateralPositions<i64>, fit: &LateralFit<i64>, lane_width_m: f64) -> Option<String> {
     if fit.departures.is_empty() {
         return None;
@@ -523,8 +523,8 @@ fn spread(positions: &LateralPositions<i64>, fit: &LateralFit<i64>, lane_width_m
     let share = spread as f64 / all.max(1) as f64;
     (share > WARNED_SPREAD).then(|| {
         format!(
-            "{:.0} % of the vehicles drive in lanes whose vehicles are spread over more than a lane: the lanes that the file names \
-             are not those of the road, and lane changes are missing",
+            "the file names lanes that are not the lanes of the road, and lane changes are missing: {:.0} % of the vehicles drive \
+             in a named lane whose vehicles are spread over more than the width of a lane",
             100.0 * share
         )
     })

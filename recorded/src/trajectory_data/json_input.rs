@@ -4,11 +4,12 @@ use std::cell::Cell;
 use std::io::{self, BufRead, Read};
 use std::rc::Rc;
 
-/// Longest text (bytes). Pictures and point clouds are longer than all else in a file; they are read
-/// over, but a parser holds a text of which it needs the end.
+/// Longest text (bytes). A parser holds a whole text in memory, even one that nothing reads. The
+/// longest texts of a file are pictures and point clouds.
 const MAX_TEXT_BYTES: usize = 1 << 26;
 
-/// Deepest nesting: twice that of OpenLABEL's frames with attributes, and less than a parser follows.
+/// Deepest nesting: twice as deep as frames of OpenLABEL with attributes, and less than a parser
+/// follows.
 const MAX_DEPTH: u32 = 100;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";

@@ -198,7 +198,7 @@ impl SideBySide {
         })
     }
 
-    /// Returns the first lane whose vehicles are spread over more than a lane.
+    /// Returns the first lane whose vehicles are spread over more than the width of a lane.
     fn widest(&self) -> Option<Spread> {
         let mut lanes: BTreeMap<(u8, Time), Vec<f64>> = BTreeMap::new();
         for (InLane { lane, vehicle }, position) in &self.positions {

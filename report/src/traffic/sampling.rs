@@ -1,13 +1,13 @@
-//! A sampled lane change: for each value of the varied parameter the path of the vehicle that
-//! changes lanes, and its time headways to the vehicle that it overtakes (Opp₁) and to the vehicle
-//! that has overtaken it (Opp₂), as a table and a figure.
+//! A sampled lane change, as a table and a figure. For each value of the varied parameter, they show
+//! the path of the vehicle that changes lanes, and its time headways to the vehicle that it overtakes
+//! (Opp₁) and to the vehicle that has overtaken it (Opp₂).
 //!
 //! The headway to Opp₁ counts from the start of the lane change until the centre of the vehicle
 //! that changes lanes crosses the marking, as long as Opp₁ is ahead in the same lane. The headway
 //! to Opp₂ counts from the start of the encounter to the end of the lane change, as soon as Opp₂ is
-//! ahead in the other lane. At one instant, both headways shrink by the same time if the vehicle
-//! that changes lanes is further ahead. The smallest one to Opp₂ stays the same if Opp₂ is closest
-//! before the lane change, because it overtakes then and drives away.
+//! ahead in the other lane. If the vehicle that changes lanes is further ahead at an instant, both
+//! headways of that instant are shorter by the same time. The smallest headway to Opp₂ can still be
+//! the same: Opp₂ may be closest while it overtakes, before the lane change, and then drives away.
 
 use std::fmt;
 
@@ -59,7 +59,7 @@ pub struct SampledRun {
     /// Positions of the vehicle that changes lanes: s and d (m).
     #[serde(skip)]
     path: Vec<(f64, f64)>,
-    /// The same, with the time.
+    /// Positions of that vehicle with the time of each.
     #[serde(skip)]
     pub(super) positions: Vec<(Time, f64, f64)>,
     /// Positions of Opp₁ and of Opp₂: s and d (m).

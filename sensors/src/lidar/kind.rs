@@ -1,4 +1,5 @@
-//! The kinds of LiDAR: scan pattern, rate, footprint and range as a file describes them.
+//! The kinds of LiDAR. A file describes the scan pattern, the rate, the footprint and the range of
+//! each.
 //!
 //! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its
 //! `model`, or a file of its own by `pattern-file`. A LiDAR that scans no raster has a table of
@@ -21,13 +22,13 @@ use super::beam_table::{self, BeamFileError, BeamLimits, BeamTable, MAX_BEAMS, M
 use super::pattern::{GROUPS, mirror_bounds_deg};
 use super::{LidarModel, MirrorSide};
 
-/// Height of a sensor if nothing else is said (m): in the bumper.
+/// Default height of a sensor (m): in the bumper.
 const MOUNT_HEIGHT_M: f64 = 0.6;
-/// Distance up to which the road may give returns to a sensor if nothing else is said (m).
+/// Default distance up to which the road may give returns to a sensor (m).
 const GROUND_REACH_M: f32 = 40.0;
-/// Power of a usual return from a vehicle (detection thresholds): an assumption, the power of a
-/// grey car that fills the beam at 130 m. The range of such a point of the SCALA has a standard
-/// deviation of 0.05 m.
+/// Power of a usual return from a vehicle (detection thresholds): an assumption. It is the power
+/// from a grey car that fills the beam at 130 m. The range of such a point of the SCALA has a
+/// standard deviation of 0.05 m.
 const USUAL_POWER: f64 = 2.25;
 /// Decimals to which that standard deviation is rounded, as a factor.
 const SD_DECIMALS: f64 = 1e4;
@@ -150,8 +151,8 @@ pub(crate) struct Resolution {
     pub(crate) mount_height_m: f64,
     /// Distance up to which the road may give returns (m).
     pub(crate) ground_reach_m: f32,
-    /// Intensity at the detection threshold at 1 m (1/m²), by which it grows with the square of the
-    /// range.
+    /// Intensity of a return at the detection threshold from 1 m (1/m²). The intensity at the
+    /// threshold grows with the square of the range.
     pub(crate) threshold_per_m2: f64,
 }
 

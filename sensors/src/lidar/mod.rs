@@ -52,7 +52,8 @@ mod targets;
 mod tests;
 mod viewpoint;
 
-/// Number of clusters in a scan for which memory is reserved. More need more, and no error follows.
+/// Number of clusters in a scan for which memory is reserved. A scan with more clusters reserves
+/// more.
 pub(crate) const RESERVED_CLUSTERS: usize = 64;
 
 pub use crate::tracking::LaneGeometry;

@@ -1,5 +1,5 @@
-//! Parts of a face that determine the middle of a vehicle although its edges are not seen: the
-//! plate, and a pair of headlamps.
+//! Parts of a face that determine the middle of a vehicle whose edges are not seen: the plate, and a
+//! pair of headlamps.
 //!
 //! ```text
 //!      ┌───────────────────────┐      A vehicle with dark paint, or one in fog, returns light from these parts alone. The plate is
@@ -12,11 +12,11 @@ use super::boxes::BoxFit;
 
 /// Width of a European registration plate (m): Council Regulation (EC) No 2411/98.
 const PLATE_WIDTH_M: f64 = 0.52;
-/// Standard deviation of the plate's middle from the middle of the face (m; assumption): holders
-/// and few models are off the middle.
+/// Standard deviation of the plate's middle from the middle of the face (m; assumption). Some
+/// holders are off the middle, and the plates of a few models are.
 const PLATE_OFFSET_SD_M: f64 = 0.05;
 /// Least distance between the inner edges of two headlamps (m): UN Regulation No 48, paragraph
-/// 6.2.4.1. It exempts cars and vans, which are assumed to keep it, too.
+/// 6.2.4.1. It exempts cars and vans; the model assumes that they keep the distance, too.
 const LAMPS_APART_M: f64 = 0.6;
 /// Greatest width of a headlamp (m; assumption).
 const LAMP_WIDTH_M: f64 = 0.4;
@@ -67,7 +67,7 @@ pub(super) fn are_lamps(a: &BoxFit, b: &BoxFit) -> bool {
 }
 
 /// Joins clusters that are the two headlamps of one vehicle: the parent of the second is the first.
-/// `parents` has the cluster that each cluster is part of, usually itself.
+/// `parents` holds for each cluster the index of the cluster that it is a part of, usually its own.
 ///
 /// The nearest pairs come first, and a cluster belongs to one pair only. Returns true if there is a
 /// pair.

@@ -32,21 +32,22 @@ use crate::workers::Samples;
 
 /// Number of samples of the campaign.
 const SAMPLES: u64 = 6;
-/// Seeds of the campaign, and of another one whose records must not be taken for its own.
+/// Seeds of the campaign, and of another campaign. A journal with a record of the other campaign
+/// must be refused.
 const SEEDS: [u64; 2] = [1, 2];
 /// Largest number of disturbed runs before the last one.
 const MOST_RUNS: u32 = 3;
-/// Probabilities of a fault at a question (-).
+/// Probabilities of a fault in the answer to a question (-).
 const RATES: [f64; 3] = [0.02, 0.1, 0.3];
 
-/// A violation: what no schedule may show.
+/// A broken property.
 #[derive(Debug)]
 pub(super) enum Violation {
     /// The journal files the outcome of another sample.
     OtherOutcome { sample: u64, arm: usize },
     /// A sample was run again after a crash, and its record does not say so.
     SilentRetry { arm: usize, sample: u64, crashes: u32, told: u32 },
-    /// A part of the samples passes for all of them.
+    /// A part of the samples counts as all samples.
     PartialData { has: u64 },
     /// Samples have no outcome, and the verdict is not ERROR.
     HiddenError { errors: u64, verdict: Option<Verdict> },
@@ -202,7 +203,7 @@ impl Setup {
         Ok((machine.faults(), verdict))
     }
 
-    /// Checks that each outcome of the journal is the one of its sample.
+    /// Checks that each record of the journal has the outcome of its own sample.
     fn check_outcomes(&self, path: &Path) -> Result<(), Violation> {
         for entry in journal::read(&path.join(JOURNAL)).unwrap() {
             let Entry::Record { record, .. } = entry.unwrap() else { break };
@@ -218,8 +219,8 @@ impl Setup {
         Ok(())
     }
 
-    /// Damages the journal as a power failure, a disk or a person does. A damage that resuming
-    /// refuses is undone. Returns whether there was one.
+    /// Damages the journal as a power failure, a disk or a person does. Undoes the damage if the
+    /// campaign refuses to resume. Returns whether the journal was damaged.
     fn damage(&self, path: &Path, random: &mut Stream, reader: Reader) -> Result<bool, Violation> {
         let journal = path.join(JOURNAL);
         let before = fs::read(&journal).unwrap();
@@ -278,7 +279,7 @@ impl Setup {
         Ok(true)
     }
 
-    /// Compares the finished campaign with an undisturbed one, apart from the notes of crashes.
+    /// Compares the finished campaign with an undisturbed campaign, except for the notes of crashes.
     fn compare_with_undisturbed(&self, path: &Path, end: Option<Verdict>) -> Result<(), Violation> {
         let mut there = journal_lines(path);
         there.iter_mut().flat_map(|record| &mut record.arms).for_each(|arm| arm.flaky = None);
@@ -300,7 +301,7 @@ struct Run {
     kill_after: Option<u64>,
     retry_errors: bool,
     retry_crashed: u32,
-    /// Probability of a fault at a question (-).
+    /// Probability of a fault in the answer to a question (-).
     rate: f64,
 }
 
