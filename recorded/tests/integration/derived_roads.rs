@@ -177,7 +177,10 @@ fn a_single_name_for_all_lanes_is_in_doubt() {
     assert_eq!(found(&data), []);
     assert!(data.is_in_doubt);
     let warnings = data.warnings();
-    assert!(warnings.iter().any(|warning| warning.contains("spread over more than the width of a lane")), "{warnings:?}");
+    assert!(
+        warnings.iter().any(|warning| warning.contains("spread over more than the width of a lane")),
+        "{warnings:?}"
+    );
 }
 
 /// Returns the rows of tracks.
