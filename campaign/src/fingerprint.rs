@@ -79,7 +79,7 @@ impl Fingerprint {
     /// Returns the fingerprint of a perception program. It is started once and greeted as in a run of `scenario`. One that cannot be
     /// greeted has no identity.
     pub fn of_program(program: &ProgramSettings, scenario: Option<&Scenario>) -> Self {
-        let settings = exec_settings(program);
+        let settings = ExecSettings::from(program);
         let stated = scenario.and_then(|scenario| identify_program(program, scenario)).unwrap_or_default();
         let (identity, open_files) = stated;
         Self {
@@ -139,12 +139,6 @@ impl Fingerprint {
 pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<String> {
     let same = |earlier: &Fingerprint| here.iter().find(|other| other.command == earlier.command);
     there.iter().filter_map(|earlier| Some(earlier.differences(same(earlier)?))).flatten().collect()
-}
-
-/// Returns the command of a perception program as that of a process.
-pub(crate) fn exec_settings(program: &ProgramSettings) -> ExecSettings {
-    let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
-    ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
 }
 
 /// Returns the hashes of the files that the command names.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use closecall_scenarios::criteria::{Expression, FlagName};
+use closecall_traffic::statistics::format::without_trailing_zeros;
 use closecall_traffic::words::counted;
 
 use super::evaluate::{Answer, Evaluation};
@@ -123,9 +124,7 @@ pub(crate) fn rounded_up(samples: u64) -> u64 {
 
 /// Writes a value with as many digits as tell it apart, and no more than four.
 fn shown(value: f64) -> String {
-    let text = format!("{value:.4}");
-    let short = text.trim_end_matches('0').trim_end_matches('.');
-    if short.is_empty() || short == "-0" { "0".to_owned() } else { short.to_owned() }
+    without_trailing_zeros(&format!("{value:.4}"))
 }
 
 /// One requirement in one scenario that is evidence for it.

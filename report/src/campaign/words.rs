@@ -11,7 +11,7 @@
 use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::criteria::{Aggregate, Comparison, Operator, Quantity, Side};
-use closecall_traffic::statistics::format::{DIGITS, percent, significant};
+use closecall_traffic::statistics::format::{DIGITS, percent, significant, without_trailing_zeros};
 use closecall_traffic::words::counted;
 
 use crate::units::unit_of;
@@ -208,9 +208,7 @@ fn measured(value: f64, bound: f64) -> String {
 
 /// Returns a number with as many digits as tell it apart, and no more than four.
 fn number(value: f64) -> String {
-    let text = format!("{value:.4}");
-    let short = text.trim_end_matches('0').trim_end_matches('.');
-    if short.is_empty() || short == "-0" { "0".to_owned() } else { short.to_owned() }
+    without_trailing_zeros(&format!("{value:.4}"))
 }
 
 /// Returns the reasons of a verdict in the order in which they are read: reasons that are not met

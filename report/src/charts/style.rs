@@ -14,6 +14,7 @@ use plotters::prelude::*;
 
 use crate::campaign::overview::Fate;
 use closecall_traffic::maths;
+use closecall_traffic::statistics::format::without_trailing_zeros;
 
 /// The surface that a chart is drawn on.
 pub(crate) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -132,11 +133,7 @@ impl ChartAxis<'_> {
 pub(crate) fn number_text(low: f64, high: f64) -> impl Fn(&f64) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few digits")]
     let digits = (2.0 - maths::log10(high - low).floor()).clamp(0.0, 6.0) as usize;
-    move |value| {
-        let text = format!("{value:.digits$}");
-        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-        if text == "-0" { "0".to_owned() } else { text.to_owned() }
-    }
+    move |value| without_trailing_zeros(&format!("{value:.digits$}"))
 }
 
 /// Draws the axes with their labels and names, and the title if there is one.

@@ -112,22 +112,17 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
 /// # Errors
 /// [`NativeError::StartProgram`] if not.
 pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
-    Child::try_start(&exec_settings(program), program.folder.map(Path::new))
+    Child::try_start(&ExecSettings::from(program), program.folder.map(Path::new))
         .map_err(|error| NativeError::StartProgram { program: program.name(), reason: error.to_string() })
 }
 
 /// Starts a program, and greets it.
 fn greet(program: &ProgramSettings, setup: &Setup<'_>) -> Result<(Child, Identity, Kind), ProgramError> {
-    let settings = exec_settings(program);
+    let settings = ExecSettings::from(program);
     let mut child = Child::start(&settings, program.folder.map(Path::new))?;
     let limit = START_TIMEOUT.max(std::time::Duration::from_millis(settings.timeout_ms));
     let hello = child.request(setup.hello(), limit)?;
     let identity = check_hello(&hello)?;
     let kind = answer::kind(&hello)?;
     Ok((child, identity, kind))
-}
-
-fn exec_settings(program: &ProgramSettings) -> ExecSettings {
-    let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
-    ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
 }

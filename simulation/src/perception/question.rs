@@ -7,7 +7,7 @@ use closecall_sensors::lidar::MirrorSide;
 use closecall_traffic::{CONTROL_STEP, Dimensions, Road};
 use serde::Serialize;
 
-use crate::controller::exec::{PROTOCOL, RoadMessage};
+use crate::controller::exec::{PROTOCOL, RoadMessage, to_line};
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
@@ -197,11 +197,4 @@ fn scan_message(outside: &OutsideScan) -> ScanMessage<'_> {
 /// Returns bytes as base64.
 fn encoded(bytes: impl Iterator<Item = u8>) -> String {
     STANDARD.encode(bytes.collect::<Vec<u8>>())
-}
-
-fn to_line(message: &Message<'_>) -> Vec<u8> {
-    // Serialising structs of numbers and names cannot fail.
-    let mut line = serde_json::to_vec(message).unwrap_or_default();
-    line.push(b'\n');
-    line
 }

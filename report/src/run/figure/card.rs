@@ -81,9 +81,7 @@ impl Window {
     /// Returns the time around the moment at which a recording of the films opens.
     fn of(films: &[Film]) -> Self {
         let shown = Film::shown_moment(films);
-        let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time);
-        let (start, end) =
-            (starts.min().unwrap_or(Time::ZERO), films.iter().map(Film::end).max().unwrap_or(Time::ZERO));
+        let [start, end] = Film::span(films);
         Self { from: (shown - BEFORE).max(start), to: (shown + AFTER).min(end) }
     }
 

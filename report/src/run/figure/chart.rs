@@ -3,6 +3,7 @@
 
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use closecall_traffic::maths;
+use closecall_traffic::statistics::format::without_trailing_zeros;
 
 /// Colour of text and axes.
 pub(super) const INK: &str = "#222222";
@@ -154,9 +155,7 @@ pub(super) fn ticks([low, high]: Range) -> Vec<f64> {
 
 /// Returns the text of a tick, without trailing zeros and without a negative zero.
 pub(super) fn tick_text(value: f64) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }
+    without_trailing_zeros(&format!("{value:.2}")).replace('-', "\u{2212}")
 }
 
 /// Returns a range that contains all finite `values` and the range `at_least`, with some room beyond the values.

@@ -30,8 +30,7 @@ const COLLISION: &str = "#c40018";
 
 /// Returns the strips of all films, on one time axis.
 pub(crate) fn timeline(films: &[Film]) -> Markup {
-    let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time);
-    let (start, end) = (starts.min().unwrap_or(Time::ZERO), films.iter().map(Film::end).max().unwrap_or(Time::ZERO));
+    let [start, end] = Film::span(films);
     let axis = Axis { start_s: start.s(), span_s: (end - start).s().max(1.0) };
     html! {
         @for film in films {

@@ -45,6 +45,13 @@ impl Film {
         collided.or(films.last()).map_or(Time::ZERO, Self::critical_frame_time)
     }
 
+    /// Returns the times of the first and of the last frame of any of these films.
+    pub(in crate::run) fn span(films: &[Self]) -> [Time; 2] {
+        let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min();
+        let end = films.iter().map(Self::end).max();
+        [start, end].map(|time| time.unwrap_or(Time::ZERO))
+    }
+
     /// Returns the time of the last frame.
     pub(crate) fn end(&self) -> Time {
         self.frames.last().map_or(Time::ZERO, |frame| frame.time)

@@ -77,9 +77,7 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
     let version = env!("CARGO_PKG_VERSION").to_owned();
     let name = recording::name(&[version, level, summary::verdict(films), summary::story(films)]);
     let recording = Recording::new(application(films), &name)?;
-    let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min();
-    let end = films.iter().map(Film::end).max();
-    let span = [start, end].map(|time| time.unwrap_or(Time::ZERO));
+    let span = Film::span(films);
     let canvases = bird::Canvas::of_films(films);
     let shown = Film::shown_moment(films);
     let mut contents = Vec::new();

@@ -134,7 +134,8 @@ pub(super) fn step(input: &EgoInput<'_>, front: Option<Front>) -> Vec<u8> {
     }))
 }
 
-fn to_line(message: &Message<'_>) -> Vec<u8> {
+/// Returns a message as a line of JSON.
+pub(crate) fn to_line(message: &impl Serialize) -> Vec<u8> {
     // Serialising structs of numbers and names cannot fail.
     let mut line = serde_json::to_vec(message).unwrap_or_default();
     line.push(b'\n');
