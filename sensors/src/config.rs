@@ -526,12 +526,11 @@ impl Sensors {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),
                     (None, Pipeline::MaskRcnn) => {
-                        let detector = ImageDetector::new(self.camera, key, self.altered.faults.rear_camera);
+                        let detector = ImageDetector::new(self.camera, key, faults);
                         Box::new(perception.with_classifier(Box::new(detector)))
                     }
                     (None, Pipeline::CropClassifier) => {
-                        let classifier =
-                            WorkerClassifier::new(self.camera, key).with_faults(self.altered.faults.rear_camera);
+                        let classifier = WorkerClassifier::new(self.camera, key, faults);
                         Box::new(perception.with_classifier(Box::new(classifier)))
                     }
                 }

@@ -14,13 +14,14 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use crate::camera::{Camera, CameraFault, ExposureKey, WholeImageDetector, fuse};
-use closecall_traffic::{Stream, Time};
+use crate::camera::{Camera, CameraFault, WholeImageDetector, fuse};
+use closecall_traffic::Time;
 
 use crate::detection_classifier::DetectionClassifier;
-use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
+use crate::exposures::{Exposure, Exposures};
+use crate::faults::FaultList;
 use crate::image_evidence::{Evidence, Exposed, ImageResult, associate, moved};
-use crate::worker_classifier::{CHANNEL, HeldImage, inference_backend};
+use crate::worker_classifier::inference_backend;
 use crate::{Detection, Extent, Health, NoiseKey, RearImage, Scene, SensorError};
 
 /// Distance along and across the ego's axis by which an object may move between two scans that
@@ -57,12 +58,7 @@ struct Pending {
 /// The camera of one run with the Mask R-CNN of its thread.
 pub(crate) struct ImageDetector {
     camera: Camera,
-    exposures: Stream,
-    faults: FaultList<CameraFault>,
-    held: Option<HeldImage>,
-    /// Number of latest successive scans in which the camera delivered no image, or the same one
-    /// again.
-    failed_scans: u32,
+    exposures: Exposures,
     next_image: Option<Time>,
     next_id: u64,
     objects: Vec<KnownObject>,
@@ -82,10 +78,7 @@ impl ImageDetector {
     pub(crate) fn new(camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
         Self {
             camera,
-            exposures: key.stream(CHANNEL),
-            faults,
-            held: None,
-            failed_scans: 0,
+            exposures: Exposures::new(key, faults),
             next_image: None,
             next_id: 0,
             objects: Vec::new(),
@@ -126,22 +119,15 @@ impl ImageDetector {
     }
 
     /// Takes an image and queues its result.
-    fn expose(
-        &mut self,
-        scene: &Scene<'_>,
-        key: ExposureKey,
-        fault: Option<&CameraFault>,
-        detections: &[Detection],
-    ) -> Result<(), SensorError> {
-        let held = self.held.as_ref().map(|held| (held.scene(), held.key));
-        let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
+    fn expose(&mut self, scene: &Scene<'_>, exposure: Exposure, detections: &[Detection]) -> Result<(), SensorError> {
+        let imaged = self.exposures.imaged(scene);
         let failed = |error: crate::camera::ClassifierError| SensorError::Classifier { reason: error.to_string() };
         let (result, instances) = NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
                 *slot = Some((self.camera, WholeImageDetector::new(self.camera, inference_backend()).map_err(failed)?));
             }
             let Some((_, network)) = slot else { return Ok((ImageResult::default(), Vec::new())) };
-            let instances = network.detect(imaged, key, fault).map_err(failed)?;
+            let instances = network.detect(&imaged, exposure.key, exposure.fault.as_ref()).map_err(failed)?;
             Ok((associate(network.camera(), scene, &instances, detections), instances))
         })?;
         self.latest = Some(RearImage { time: scene.time, shown_time: imaged.time, instances });
@@ -168,18 +154,13 @@ impl ImageDetector {
 
 impl DetectionClassifier for ImageDetector {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        // The key is drawn in each scan, so that both arms of a pair get the same exposures.
-        let key = ExposureKey::draw(&mut self.exposures);
-        let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
-        let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
-        self.failed_scans = if is_dead || is_frozen { self.failed_scans.saturating_add(1) } else { 0 };
-        self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
+        let exposure = self.exposures.expose(scene);
         self.link(scene.time, detections);
         let due = *self.next_image.get_or_insert(scene.time);
         if scene.time >= due {
             self.next_image = Some(due + seconds(self.camera.mask_rcnn.period_s));
-            if !is_dead {
-                self.expose(scene, key, fault.as_ref(), detections)?;
+            if !exposure.is_dead() {
+                self.expose(scene, exposure, detections)?;
             }
         }
         self.receive(scene);
@@ -203,7 +184,7 @@ impl DetectionClassifier for ImageDetector {
     }
 
     fn health(&self) -> Health {
-        if self.failed_scans >= NOTICED_AFTER_SCANS { Health::Failed } else { Health::Ok }
+        self.exposures.health()
     }
 }
 

@@ -7,24 +7,11 @@
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
-use closecall_traffic::{Environment, Road, Stream, Time};
-
-use crate::camera::CameraFault;
-use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
+use crate::camera::{Backend, Camera, CameraFault, CropClassifier, ImageMemory, ImagedScene};
 use crate::detection_classifier::DetectionClassifier;
-use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
-use crate::{Detection, Health, NoiseKey, Scene, SceneVehicle, SensorError};
-
-/// Name of the camera's random stream.
-pub(crate) const CHANNEL: &str = "rear-camera";
-
-/// Returns the noise keys of the rear camera's exposures in one run, scan by scan.
-///
-/// With the key of an exposure, its image can be rendered again.
-pub fn rear_exposures(key: &NoiseKey) -> impl Iterator<Item = ExposureKey> + use<> {
-    let mut exposures = key.stream(CHANNEL);
-    std::iter::repeat_with(move || ExposureKey::draw(&mut exposures))
-}
+use crate::exposures::Exposures;
+use crate::faults::FaultList;
+use crate::{Detection, Health, NoiseKey, Scene, SensorError};
 
 /// The inference backend of this process.
 static BACKEND: OnceLock<Backend> = OnceLock::new();
@@ -49,71 +36,25 @@ pub fn inference_backend() -> &'static Backend {
 /// The camera of one run. It classifies with the network of its thread.
 pub(crate) struct WorkerClassifier {
     camera: Camera,
-    exposures: Stream,
+    exposures: Exposures,
     memory: ImageMemory,
-    faults: FaultList<CameraFault>,
-    /// The latest image before the camera froze.
-    held: Option<HeldImage>,
-    /// Number of latest successive steps in which the camera delivered no image, or the same one
-    /// again.
-    failed_steps: u32,
-}
-
-/// The scene of an image, and the key of its noise.
-pub(crate) struct HeldImage {
-    time: Time,
-    environment: Environment,
-    road: Road,
-    ego: SceneVehicle,
-    others: Vec<SceneVehicle>,
-    pub(crate) key: ExposureKey,
-}
-
-impl HeldImage {
-    pub(crate) fn of(scene: &Scene<'_>, key: ExposureKey) -> Self {
-        let Scene { time, ego, .. } = *scene;
-        Self { time, environment: *scene.environment, road: *scene.road, ego, others: scene.others.to_vec(), key }
-    }
-
-    pub(crate) fn scene(&self) -> Scene<'_> {
-        Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
-    }
 }
 
 impl WorkerClassifier {
     /// Creates the camera of one run, whose exposure noise is keyed by `key`.
-    pub(crate) fn new(camera: Camera, key: &NoiseKey) -> Self {
-        Self {
-            camera,
-            exposures: key.stream(CHANNEL),
-            memory: ImageMemory::default(),
-            faults: FaultList::default(),
-            held: None,
-            failed_steps: 0,
-        }
-    }
-
-    /// Returns the same camera with faults.
-    pub(crate) fn with_faults(self, faults: FaultList<CameraFault>) -> Self {
-        Self { faults, ..self }
+    pub(crate) fn new(camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+        Self { camera, exposures: Exposures::new(key, faults), memory: ImageMemory::default() }
     }
 }
 
 impl DetectionClassifier for WorkerClassifier {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        // The key is drawn even if nothing is detected, so that both arms of a pair get the same
-        // exposures.
-        let key = ExposureKey::draw(&mut self.exposures);
-        let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
-        let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
-        self.failed_steps = if is_dead || is_frozen { self.failed_steps.saturating_add(1) } else { 0 };
-        self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
-        if is_dead {
+        let exposure = self.exposures.expose(scene);
+        if exposure.is_dead() {
             return Ok(());
         }
-        let held = self.held.as_ref().map(|held| (held.scene(), held.key));
-        let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
-        let seen = ImagedScene { now: scene, imaged, fault: fault.as_ref() };
+        let imaged = self.exposures.imaged(scene);
+        let seen = ImagedScene { now: scene, imaged: &imaged, fault: exposure.fault.as_ref() };
         let memory = &mut self.memory;
         NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
@@ -124,7 +65,7 @@ impl DetectionClassifier for WorkerClassifier {
             }
             match slot {
                 Some((_, network)) => network
-                    .classify_with(seen, key, memory, detections)
+                    .classify_with(seen, exposure.key, memory, detections)
                     .map(|_| ())
                     .map_err(|error| SensorError::Classifier { reason: error.to_string() }),
                 None => Ok(()),
@@ -133,6 +74,6 @@ impl DetectionClassifier for WorkerClassifier {
     }
 
     fn health(&self) -> Health {
-        if self.failed_steps >= NOTICED_AFTER_SCANS { Health::Failed } else { Health::Ok }
+        self.exposures.health()
     }
 }

@@ -1,11 +1,11 @@
 //! The images of the rear camera that a program gets.
 
-use closecall_traffic::{Stream, Time};
+use closecall_traffic::Time;
 
 use super::settings::ImageSettings;
-use crate::camera::{Camera, CameraFault, ExposureKey, Frame, FrameBuffers, Sampling};
+use crate::camera::{Camera, CameraFault, Frame, FrameBuffers, Sampling};
+use crate::exposures::Exposures;
 use crate::faults::FaultList;
-use crate::worker_classifier::{CHANNEL, HeldImage};
 use crate::{NoiseKey, Scene};
 
 /// An image as a program gets it.
@@ -64,9 +64,7 @@ pub(crate) struct OutsideCamera {
     camera: Camera,
     settings: ImageSettings,
     sampling: Sampling,
-    exposures: Stream,
-    faults: FaultList<CameraFault>,
-    held: Option<HeldImage>,
+    exposures: Exposures,
     next: Option<Time>,
     lists: FrameBuffers,
 }
@@ -78,9 +76,7 @@ impl OutsideCamera {
             camera,
             settings,
             sampling: Sampling::every(settings.step, camera.resolution),
-            exposures: key.stream(CHANNEL),
-            faults,
-            held: None,
+            exposures: Exposures::new(key, faults),
             next: None,
             lists: FrameBuffers::default(),
         }
@@ -93,29 +89,24 @@ impl OutsideCamera {
 
     /// Returns the image of a scene if one is due, and the camera is not dead.
     pub(crate) fn image(&mut self, scene: &Scene<'_>) -> Option<OutsideImage> {
-        // The key is drawn in each scan, so that both arms of a pair get the same exposures.
-        let key = ExposureKey::draw(&mut self.exposures);
-        let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
-        let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
-        self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
+        let exposure = self.exposures.expose(scene);
         let due = *self.next.get_or_insert(scene.time);
         if scene.time < due {
             return None;
         }
         self.next = Some(due + self.settings.period);
-        if is_dead {
+        if exposure.is_dead() {
             return None;
         }
-        let held = self.held.as_ref().map(|held| (held.scene(), held.key));
-        let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
+        let imaged = self.exposures.imaged(scene);
         let lists = std::mem::take(&mut self.lists);
-        let mut frame = Frame::with_buffers(lists, &self.camera, imaged, key, &[self.camera.resolution.image()]);
-        if let Some(fault) = &fault {
-            frame.add_glare(fault, imaged);
+        let mut frame = Frame::with_buffers(lists, &self.camera, &imaged, exposure.key, &[self.camera.resolution.image()]);
+        if let Some(fault) = &exposure.fault {
+            frame.add_glare(fault, &imaged);
         }
         let mut picture = frame.sampled(self.sampling.columns(), self.sampling.rows()).image;
         self.lists = frame.into_buffers();
-        if let Some(fault) = &fault {
+        if let Some(fault) = &exposure.fault {
             fault.apply_to_picture(&mut picture, &self.sampling, self.camera.resolution);
         }
         Some(OutsideImage { time: scene.time, width: picture.width, height: picture.height, rgb: picture.rgb })
