@@ -52,7 +52,7 @@ impl Exposures {
 
     /// Returns the exposure of a scan. Each scan draws a key, even if it needs no image: both arms of
     /// a pair then get the same exposures.
-    pub(crate) fn expose(&mut self, scene: &Scene<'_>) -> Exposure {
+    pub(crate) fn next_exposure(&mut self, scene: &Scene<'_>) -> Exposure {
         let key = ExposureKey::draw(&mut self.keys);
         let fault = self.faults.at(scene.time);
         let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));

@@ -154,7 +154,7 @@ impl ImageDetector {
 
 impl DetectionClassifier for ImageDetector {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        let exposure = self.exposures.expose(scene);
+        let exposure = self.exposures.next_exposure(scene);
         self.link(scene.time, detections);
         let due = *self.next_image.get_or_insert(scene.time);
         if scene.time >= due {

@@ -49,7 +49,7 @@ impl WorkerClassifier {
 
 impl DetectionClassifier for WorkerClassifier {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        let exposure = self.exposures.expose(scene);
+        let exposure = self.exposures.next_exposure(scene);
         if exposure.is_dead() {
             return Ok(());
         }

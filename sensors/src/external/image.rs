@@ -89,7 +89,7 @@ impl OutsideCamera {
 
     /// Returns the image of a scene if one is due, and the camera is not dead.
     pub(crate) fn image(&mut self, scene: &Scene<'_>) -> Option<OutsideImage> {
-        let exposure = self.exposures.expose(scene);
+        let exposure = self.exposures.next_exposure(scene);
         let due = *self.next.get_or_insert(scene.time);
         if scene.time < due {
             return None;
