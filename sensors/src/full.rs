@@ -16,7 +16,7 @@ use crate::lidar_chain::MAX_ADDITIONAL_LIDARS;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
-use crate::radar::{RearRadar, RearRadars};
+use crate::radar::{MountedRadars, RearRadar, RearRadars};
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Alterations, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
 
@@ -197,6 +197,10 @@ impl Perception for FullPerception {
     fn used_boxes(&self) -> Vec<UsedBox> {
         let front = self.front_lidar.iter().flat_map(FrontLidar::used_boxes);
         front.chain(self.rear.iter().flat_map(LidarChain::used_boxes)).collect()
+    }
+
+    fn rear_radars(&self) -> Option<MountedRadars<'_>> {
+        self.rear.as_ref().and_then(LidarChain::rear_radars)
     }
 
     fn rear_image(&self) -> Option<&RearImage> {

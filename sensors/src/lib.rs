@@ -57,6 +57,6 @@ pub use object::{
     ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
 pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth, UsedBox};
-pub use radar::{RearRadar, RearRadarConfig};
+pub use radar::{MountedRadars, RadarReturn, RadarSource, RearRadar, RearRadarConfig};
 pub use recorded::{RecordedPerception, RecordedScanError};
 pub use worker_classifier::{inference_backend, set_inference_backend};

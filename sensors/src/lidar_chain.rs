@@ -30,7 +30,7 @@ use crate::detection_classifier::DetectionClassifier;
 use crate::lidar::{Lidar, LidarScan, RESERVED_CLUSTERS};
 use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
-use crate::radar::RearRadars;
+use crate::radar::{MountedRadars, RearRadars};
 use crate::surroundings::OtherVehicle;
 use crate::{Alterations, Detection, Health, Scene, SensorError};
 
@@ -339,10 +339,16 @@ impl LidarChain {
         self.sensors.iter().map(ChainSensor::field)
     }
 
+    /// Returns the radars with their latest scan, if there are any.
+    pub(crate) fn rear_radars(&self) -> Option<MountedRadars<'_>> {
+        self.radars.as_ref().map(RearRadars::mounted)
+    }
+
     /// Returns the health of the sensors together. Without a radar the chain works, less well.
     pub(crate) fn health(&self) -> Health {
+        let radars = self.radars.as_ref().map_or(Health::Ok, RearRadars::health);
         match health::of_all(&self.sensors) {
-            Health::Ok if self.radars.as_ref().is_some_and(RearRadars::has_failed) => Health::Degraded,
+            Health::Ok if radars != Health::Ok => Health::Degraded,
             health => health,
         }
     }

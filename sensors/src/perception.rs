@@ -6,6 +6,7 @@ use closecall_traffic::{Time, Track};
 
 use crate::error::SensorError;
 use crate::lidar::RearLidar;
+use crate::radar::MountedRadars;
 use crate::{Detection, Scene};
 
 /// Operating state of a group of sensors.
@@ -143,6 +144,11 @@ pub trait Perception: Send {
     /// Returns the first of the rear LiDARs. Returns `None` if none is simulated.
     fn rear_lidar(&self) -> Option<MountedLidar<'_>> {
         self.lidars().into_iter().find(|lidar| !lidar.looks_ahead)
+    }
+
+    /// Returns the pair of rear radars with its latest scan. Returns `None` if none is simulated.
+    fn rear_radars(&self) -> Option<MountedRadars<'_>> {
+        None
     }
 
     /// Returns the latest image of the rear camera that a network has evaluated as a whole. Returns

@@ -16,6 +16,15 @@ fn record_pair(file: &Path) -> Value {
     serde_json::from_str(&stdout(&closecall(arguments), 0)).unwrap()
 }
 
+/// Writes a recording of a run with rear radars.
+fn record_rear_radars(file: &Path) {
+    let (scenario, file) = (library("low-thw-overtake"), file.to_str().unwrap());
+    let sensors =
+        ["--sensors", "full", "--set", "sensors.rear-camera.pipeline=\"off\"", "--set", "sensors.rear-radar={}"];
+    let arguments = ["run", scenario.to_str().unwrap(), "--record", file];
+    stdout(&closecall(arguments.iter().chain(&sensors)), 0);
+}
+
 /// Returns a Python program of the page.
 fn program_of_page(number: usize) -> String {
     let page = std::fs::read_to_string(Path::new(ROOT).join("docs/how-to/looking.md")).unwrap();
@@ -73,13 +82,15 @@ fn the_first_program_of_the_page_plots_the_rear_headway_and_lists_the_collisions
 fn the_table_of_the_page_names_what_a_recording_holds() {
     let Some(python) = python_with_rerun() else { return };
     let folder = folder();
-    let [file, script] = ["pair.rrd", "columns.py"].map(|name| folder.path().join(name));
+    let [file, radars, script] = ["pair.rrd", "radars.rrd", "columns.py"].map(|name| folder.path().join(name));
     record_pair(&file);
+    record_rear_radars(&radars);
     let program = "import sys\nfrom rerun.experimental import RrdReader\n\
                    for column in RrdReader(sys.argv[1]).stream().collect().schema().component_columns():\n\
                    \x20   print(column.entity_path, column.component)\n";
     std::fs::write(&script, program).unwrap();
-    let text = stdout(&Command::new(&python).arg(&script).arg(&file).output().unwrap(), 0);
+    let columns = |file: &Path| stdout(&Command::new(&python).arg(&script).arg(file).output().unwrap(), 0);
+    let text = columns(&file) + &columns(&radars);
     let held: Vec<&str> = text.lines().collect();
     let page = std::fs::read_to_string(Path::new(ROOT).join("docs/how-to/looking.md")).unwrap();
     let (_, table) = page.split_once("| entity below `ARM` | component |").expect("a table");

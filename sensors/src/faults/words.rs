@@ -15,8 +15,10 @@ pub enum SensorGroup {
     Front,
     /// The short-range sensors to both sides.
     Surround,
-    /// The sensors that look back.
+    /// The sensors that look back, except the radars.
     Rear,
+    /// The rear radars, which also belong to the sensors that look back.
+    RearRadars,
     /// The odometry and the map, which every function relies on.
     Odometry,
 }
@@ -84,7 +86,7 @@ impl Faults {
                     state(&mut stated, &self.rear_lidar, (SensorGroup::Rear, "rear LiDAR"));
                     state(&mut stated, &self.rear_camera, (SensorGroup::Rear, "rear camera"));
                     if acting.has_rear_radar {
-                        state(&mut stated, &self.rear_radar, (SensorGroup::Rear, "rear radar"));
+                        state(&mut stated, &self.rear_radar, (SensorGroup::RearRadars, "rear radar"));
                     }
                 }
                 false => state(&mut stated, &self.rear_object, (SensorGroup::Rear, "rear sensor")),

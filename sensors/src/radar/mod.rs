@@ -29,7 +29,9 @@
 
 mod config;
 mod measure;
+mod output;
 mod sensor;
 
 pub use config::{RearRadar, RearRadarConfig};
+pub use output::{MountedRadars, RadarReturn, RadarSource};
 pub(crate) use sensor::RearRadars;

@@ -13,10 +13,11 @@ use rand::RngExt;
 
 use super::config::RearRadar;
 use super::measure::{Mount, Reflector, mirrored, rails_m};
+use super::output::{MountedRadars, RadarReturn, RadarSource};
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, RadarFault};
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::{RadarDetection, RadarScan};
-use crate::{NoiseKey, Scene, SensorError};
+use crate::{Health, NoiseKey, Scene, SensorError};
 
 /// The random streams of the radar on the side on which vehicles overtake, and of the other one.
 const CHANNELS: [&str; 2] = ["rear-radar-passing", "rear-radar-slow"];
@@ -75,6 +76,8 @@ pub(crate) struct RearRadars {
     targets: Vec<TargetStreams>,
     others: Vec<OtherVehicle>,
     pending: VecDeque<PendingScan>,
+    /// Time of the latest scan, and its detections by the left and by the right radar.
+    latest: (Option<Time>, [Vec<RadarReturn>; 2]),
     /// Numbers of latest successive scans in which the left and the right radar delivered nothing.
     dead_scans: [u32; 2],
 }
@@ -99,6 +102,7 @@ impl RearRadars {
             targets: Vec::new(),
             others: Vec::new(),
             pending: VecDeque::new(),
+            latest: (None, [Vec::new(), Vec::new()]),
             dead_scans: [0; 2],
         }
     }
@@ -108,10 +112,21 @@ impl RearRadars {
         Self { faults, ..self }
     }
 
-    /// Returns whether a radar has delivered nothing for a while.
-    pub(crate) fn has_failed(&self) -> bool {
+    /// Returns the health of the two radars together: failed if both have delivered nothing for a
+    /// while, and degraded if one of them has.
+    pub(crate) fn health(&self) -> Health {
         let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
-        self.dead_scans.iter().any(|scans| f64::from(*scans) * self.model.period_s() >= noticed_s)
+        match self.dead_scans.map(|scans| f64::from(scans) * self.model.period_s() >= noticed_s) {
+            [true, true] => Health::Failed,
+            [false, false] => Health::Ok,
+            _ => Health::Degraded,
+        }
+    }
+
+    /// Returns the radars with their latest scan.
+    pub(crate) fn mounted(&self) -> MountedRadars<'_> {
+        let (time, [left, right]) = &self.latest;
+        MountedRadars { health: self.health(), time: *time, returns: [left, right] }
     }
 
     /// Measures `scene`, which the ego believes to be `believed`, if a scan is due. The tracker may
@@ -127,7 +142,10 @@ impl RearRadars {
         let result = self.scan(scene, &mut others);
         self.others = others;
         let (time, road, ego) = (scene.time, *believed.road, believed.ego.state);
-        self.pending.push_back(PendingScan { time, due_step, road, ego, detections: result? });
+        let returns = result?;
+        let detections = returns.each_ref().map(|returns| returns.iter().map(|one| one.measured).collect());
+        self.pending.push_back(PendingScan { time, due_step, road, ego, detections });
+        self.latest = (Some(time), returns);
         Ok(())
     }
 
@@ -136,10 +154,10 @@ impl RearRadars {
         &mut self,
         scene: &Scene<'_>,
         others: &mut Vec<OtherVehicle>,
-    ) -> Result<[Vec<RadarDetection>; 2], SensorError> {
+    ) -> Result<[Vec<RadarReturn>; 2], SensorError> {
         let frame = transform_scene(scene, others)?;
         let passing = scene.road.overtaking_side();
-        let mut detections = [Vec::new(), Vec::new()];
+        let mut returns = [Vec::new(), Vec::new()];
         for (index, side) in SIDES.into_iter().enumerate() {
             let fault = self.faults.of_side(side).at(scene.time);
             let is_dead = fault.is_some_and(|fault| fault.is_dead);
@@ -149,21 +167,23 @@ impl RearRadars {
             for (place, other) in view.others.iter().enumerate() {
                 let target = self.target(other.actor);
                 let draws = self.targets[target].draw(usize::from(side != passing));
-                self.detect(view, place, draws, &mut detections[index]);
+                self.detect(view, place, draws, &mut returns[index]);
             }
         }
-        Ok(detections)
+        Ok(returns)
     }
 
     /// Appends the detections of the vehicle with this place in the list.
-    fn detect(&self, view: View<'_>, place: usize, draws: [Draws; 3], detections: &mut Vec<RadarDetection>) {
+    fn detect(&self, view: View<'_>, place: usize, draws: [Draws; 3], returns: &mut Vec<RadarReturn>) {
         let point = view.mount.nearest_point(&view.others[place]);
         let mut others = view.others.iter().enumerate().filter(|(other, _)| *other != place);
         if others.any(|(_, other)| view.mount.is_hidden_by(&point, other)) {
             return;
         }
         let [direct, images @ ..] = draws;
-        detections.extend(self.detection(view, &point, &direct));
+        let actor = view.others[place].actor;
+        let with = |source: RadarSource| move |measured: RadarDetection| RadarReturn { measured, source };
+        returns.extend(self.detection(view, &point, &direct).map(with(RadarSource::Vehicle(actor))));
         let road = view.scene.road;
         if !road.has_guard_rails() {
             return;
@@ -175,7 +195,8 @@ impl RearRadars {
         };
         for (rail_m, draws) in rails_m.into_iter().zip(images) {
             if draws.image < self.model.ghost_probability {
-                detections.extend(self.detection(view, &mirrored(&point, rail_m, view.frame), &draws));
+                let image = self.detection(view, &mirrored(&point, rail_m, view.frame), &draws);
+                returns.extend(image.map(with(RadarSource::MirrorImage(actor))));
             }
         }
     }
@@ -344,6 +365,28 @@ mod tests {
     }
 
     #[test]
+    fn each_detection_has_its_vehicle_and_an_image_is_no_vehicle() {
+        let road = Road::straight(3).with_guard_rails();
+        let mut radars = radars("detection-probability = 1.0\nghost-probability = 1.0\nazimuth-sd-deg = 0.01", 7);
+        let empty = radars.mounted();
+        assert!(empty.time.is_none() && empty.returns.iter().all(|returns| returns.is_empty()));
+        let [measured, _] = detections(&mut radars, &road, &[car(38.0)], 1);
+        let mounted = radars.mounted();
+        assert_eq!((mounted.time, mounted.health), (Some(Time::ZERO), Health::Ok));
+        let [left, _] = mounted.returns;
+        assert_eq!(left.iter().map(|one| one.measured).collect::<Vec<_>>(), measured);
+        let [left_rail_m, right_rail_m] = rails_m(&road);
+        assert_eq!(left.len(), 3, "the car and two images: {left:?}");
+        for one in left {
+            let RadarDetection { sensor_m, range_m, azimuth_rad, .. } = one.measured;
+            let left_m = OWN_LANE_M + sensor_m[1] + range_m * closecall_traffic::maths::sin(azimuth_rad);
+            let is_on_road = (right_rail_m..left_rail_m).contains(&left_m);
+            assert_eq!(one.source.exists(), is_on_road, "{one:?}");
+            assert_eq!(one.source, if is_on_road { RadarSource::Vehicle(1) } else { RadarSource::MirrorImage(1) });
+        }
+    }
+
+    #[test]
     fn another_vehicle_changes_no_error_of_the_first() {
         let road = Road::straight(3);
         let other = with_speed(scene_vehicle(2, VehicleClass::Car, EGO_S_M - 30.0, OWN_LANE_M - 3.75), 30.0);
@@ -375,17 +418,17 @@ mod tests {
             let list = FaultList::throughout_of(fault);
             let mut radars = radars("detection-probability = 1.0", 1).with_faults(list);
             let counts = detections(&mut radars, &road, &[car(38.0)], 100).map(|all| all.len());
-            (counts, radars.has_failed())
+            (counts, radars.health())
         };
         let usual = RadarFault::default();
-        assert_eq!(seen(usual), ([100, 100], false));
-        assert_eq!(seen(RadarFault { is_dead: true, ..usual }), ([0, 0], true));
-        assert_eq!(seen(RadarFault { is_dead: true, side: Some(Side::Left), ..usual }), ([0, 100], true));
+        assert_eq!(seen(usual), ([100, 100], Health::Ok));
+        assert_eq!(seen(RadarFault { is_dead: true, ..usual }), ([0, 0], Health::Failed));
+        assert_eq!(seen(RadarFault { is_dead: true, side: Some(Side::Left), ..usual }), ([0, 100], Health::Degraded));
         // The car is 45 m behind, 3 m to the left.
         let blocked = |from_deg, to_deg| RadarFault::default().with_blocked(from_deg, to_deg);
-        assert_eq!(seen(blocked(0.0, 10.0)), ([0, 0], false));
-        assert_eq!(seen(blocked(-10.0, 0.0)), ([100, 100], false));
-        assert_eq!(seen(RadarFault { range_share: 0.4, ..usual }), ([0, 0], false));
+        assert_eq!(seen(blocked(0.0, 10.0)), ([0, 0], Health::Ok));
+        assert_eq!(seen(blocked(-10.0, 0.0)), ([100, 100], Health::Ok));
+        assert_eq!(seen(RadarFault { range_share: 0.4, ..usual }), ([0, 0], Health::Ok));
         let ([left, _], _) = seen(RadarFault { dropout: 0.5, ..usual });
         assert!((30..=70).contains(&left), "{left}");
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use closecall_controllers::EgoCommand;
 use closecall_sensors::camera::Camera;
 use closecall_sensors::faults::StatedFault;
-use closecall_sensors::{FieldOfView, NoiseKey, RearImage, Scene, SceneVehicle, SensorHealth};
+use closecall_sensors::{FieldOfView, Health, NoiseKey, RadarReturn, RearImage, Scene, SceneVehicle, SensorHealth};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState, maths};
@@ -103,6 +103,11 @@ pub struct Frame {
     pub(in crate::run) scan: Option<Scan>,
     /// Scans of the other LiDARs with their names, likewise.
     pub(in crate::run) other_scans: Vec<(&'static str, Scan)>,
+    /// Health of the rear radars as the ego knows it; `None` without them.
+    pub(in crate::run) radar_health: Option<Health>,
+    /// Detections of the left and of the right rear radar, in the frames with a new scan; none
+    /// below [`Level::Objects`].
+    pub(in crate::run) radar_returns: Option<[Vec<RadarReturn>; 2]>,
     /// Image of the rear camera that a network has evaluated as a whole, in the frames in which one was taken; none below [`Level::Full`].
     pub(in crate::run) rear_image: Option<RearImage>,
 }

@@ -3,7 +3,7 @@
 use closecall_controllers::{CheckedDriver, EgoSettings};
 use closecall_sensors::camera::Pipeline;
 use closecall_sensors::lidar::RearLidar;
-use closecall_sensors::{Detection, NoiseKey, SensorMode};
+use closecall_sensors::{Detection, NoiseKey, RadarReturn, SensorMode};
 use closecall_traffic::Time;
 
 use super::knowledge::rear_seen;
@@ -206,6 +206,7 @@ impl Observer for FilmRecorder {
         let keeps_objects = self.film.level >= Level::Objects;
         let keeps_images = self.film.level >= Level::Full;
         let (scan, other_scans) = self.scans(view);
+        let radars = view.perception.rear_radars();
         self.film.frames.push(Frame {
             time: view.time,
             states: view.vehicles.iter().map(|vehicle| vehicle.state).collect(),
@@ -219,6 +220,10 @@ impl Observer for FilmRecorder {
             rear_fields: if keeps_objects { view.perception.rear_fields() } else { Vec::new() },
             scan,
             other_scans,
+            radar_health: radars.map(|radars| radars.health),
+            radar_returns: radars
+                .filter(|radars| keeps_objects && radars.time == Some(view.time))
+                .map(|radars| radars.returns.map(<[RadarReturn]>::to_vec)),
             rear_image: view.perception.rear_image().filter(|image| keeps_images && image.time == view.time).cloned(),
         });
     }

@@ -242,6 +242,8 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         health: None,
         rear_fields: Vec::new(),
         other_scans: Vec::new(),
+        radar_health: None,
+        radar_returns: None,
         rear_image: None,
         scan: None,
     }

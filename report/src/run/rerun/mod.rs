@@ -29,6 +29,7 @@ mod perceived;
 mod plots;
 mod points;
 mod properties;
+mod radars;
 mod recording;
 mod road;
 mod stream;

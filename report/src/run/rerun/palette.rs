@@ -57,6 +57,7 @@ pub(super) const TRUTH: Rgba = [110, 214, 120, 255];
 pub(super) const MISSED: Rgba = [255, 120, 0, 255];
 pub(super) const FALSE_TRACK: Rgba = [255, 0, 200, 255];
 pub(super) const FIELD_OF_VIEW: Rgba = [150, 220, 255, 255];
+pub(super) const RADAR: Rgba = [120, 170, 255, 255];
 pub(super) const TRACK: Rgba = [96, 230, 255, 255];
 pub(super) const SAFE: Rgba = [26, 134, 70, 255];
 pub(super) const CRITICAL: Rgba = [220, 38, 38, 255];

@@ -12,8 +12,8 @@ use super::plots::Role;
 use super::recording::{self, Recording};
 use super::stream::Writer;
 use super::{
-    bird, camera, collisions, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth,
-    vehicles,
+    bird, camera, collisions, fog, ghosts, log, palette, perceived, plots, points, properties, radars, road, summary,
+    truth, vehicles,
 };
 use crate::run::film::{Film, Level};
 use closecall_traffic::atomic::{WriteError, check_writable, write_atomically};
@@ -148,6 +148,7 @@ fn write_film(
         perceived::write(writer, film)?;
         contents.hidden_layers.extend(truth::write(writer, film)?);
         contents.hidden_layers.extend(points::write(writer, film)?);
+        radars::write(writer, film)?;
         bird::write(writer, canvas)?;
         contents.has_scene = true;
         contents.has_camera = camera::write(writer, film)?;

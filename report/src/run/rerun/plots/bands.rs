@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 
 use closecall_controllers::EgoState;
 use closecall_scenarios::outcome::{Phase, ReachedMoment};
-use closecall_sensors::faults::SensorGroup;
-use closecall_sensors::{Health, SensorHealth};
+use closecall_sensors::Health;
+use closecall_sensors::faults::{SensorGroup, StatedFault};
 use closecall_traffic::Time;
 use rerun::{StateChange, StateConfiguration};
 
@@ -68,13 +68,14 @@ const HEALTHY: &str = "healthy";
 const DEGRADED: &str = "degraded";
 const FAILED: &str = "failed";
 
-/// A group of sensors: its row, its health, and the group of the faults that concern it.
-type HealthRow = (&'static str, fn(&SensorHealth) -> Health, SensorGroup);
+/// A group of sensors: its row, its health in a frame, and the groups of the faults that concern it.
+type HealthRow = (&'static str, fn(&Frame) -> Option<Health>, &'static [SensorGroup]);
 
-const HEALTH_ROWS: [HealthRow; 3] = [
-    ("5_rear_sensors", |health| health.rear, SensorGroup::Rear),
-    ("7_front_sensor", |health| health.front, SensorGroup::Front),
-    ("7_side_sensors", |health| health.surround, SensorGroup::Surround),
+const HEALTH_ROWS: [HealthRow; 4] = [
+    ("5_rear_radars", |frame| frame.radar_health, &[SensorGroup::RearRadars]),
+    ("5_rear_sensors", |frame| frame.health.map(|health| health.rear), &[SensorGroup::Rear, SensorGroup::RearRadars]),
+    ("7_front_sensor", |frame| frame.health.map(|health| health.front), &[SensorGroup::Front]),
+    ("7_side_sensors", |frame| frame.health.map(|health| health.surround), &[SensorGroup::Surround]),
 ];
 
 const BRAKING: [Word<'static>; 2] =
@@ -191,19 +192,23 @@ impl Plots<'_> {
         )
     }
 
-    /// Writes a band for each group of sensors: its health as the ego knows it, and injected faults
+    /// Writes a band for each group of sensors that exists: its health as the ego knows it, and injected faults
     /// that the ego has not noticed. The arms of a pair have the same sensors, so the baseline
     /// writes none.
     fn health(&self) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
         }
-        for (row, health, group) in HEALTH_ROWS {
+        for (row, health, groups) in HEALTH_ROWS {
+            if self.film.frames.iter().all(|frame| health(frame).is_none()) {
+                continue;
+            }
             let text = |frame: &Frame| {
-                let held = self.film.faults.iter().filter(|fault| fault.group == group && fault.holds_at(frame.time));
+                let concerns = |fault: &StatedFault| groups.contains(&fault.group) && fault.holds_at(frame.time);
+                let held = self.film.faults.iter().filter(|fault| concerns(fault));
                 let effects: Vec<String> = held.map(|fault| format!("{} {}", fault.sensor, fault.effects)).collect();
                 let suffix = if effects.is_empty() { String::new() } else { format!(": {}", effects.join("; ")) };
-                match frame.health.as_ref().map(health) {
+                match health(frame) {
                     Some(Health::Failed) => format!("{FAILED}{suffix}"),
                     Some(Health::Degraded) => format!("{DEGRADED}{suffix}"),
                     Some(Health::Ok) | None if effects.is_empty() => HEALTHY.to_owned(),

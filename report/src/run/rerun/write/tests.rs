@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use arrow::array::AsArray;
-use arrow::datatypes::{Float32Type, UInt16Type, UInt32Type};
+use arrow::datatypes::{Float32Type, Float64Type, UInt16Type, UInt32Type};
 use closecall_recorded::encounter::{Lead, encounter};
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::detect;
@@ -236,6 +236,72 @@ fn every_lidar_has_its_points_and_boxes_where_it_looks() {
     let (_, empty, _) = empty_views(&films);
     assert!(empty.is_empty(), "{empty:?}");
     assert!(frames.iter().all(|frame| frame.rear_fields.len() == 2));
+}
+
+/// Returns the film of a short run behind which a car drives, in mode `full` with these keys.
+fn filmed_with(keys: &str) -> Film {
+    let text = format!(
+        "base = \"low-thw-overtake\"\nname = \"radars\"\nduration-s = 4.0\nsensors.mode = \"full\"\n\
+         sensors.rear-camera.pipeline = \"off\"\nroad.guard-rails = true\n{keys}"
+    );
+    let file = ScenarioFile::parse(Path::new("radars.toml"), &text, &[]).unwrap();
+    let scenario = file.concrete(&file.space().nominal()).unwrap();
+    let arm = Arm { controller: ControllerChoice::MIS.factory(), sensors: None };
+    let key = RunKey { seed: 1, sample: 0 };
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Objects);
+    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
+    recorder.finish(&outcome)
+}
+
+#[test]
+fn rear_radars_have_points_with_radial_speeds_and_ghosts_are_no_vehicles() {
+    let radar = "sensors.rear-radar = { range-m = 300, detection-probability = 1.0, ghost-probability = 1.0 }\n";
+    let films = [filmed_with(radar)];
+    let data = chunks(&films, StoreKind::Recording);
+    for (index, side) in ["left", "right"].into_iter().enumerate() {
+        let entity = format!("/mis/world/ego/radars/{side}");
+        let (mut speeds_mps, mut exists, mut units) = (Vec::new(), Vec::new(), Vec::new());
+        let time = TimelineName::from_static_str(TIME_TIMELINE);
+        let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == entity);
+        for chunk in rows.filter(|chunk| chunk.timelines().contains_key(&time)) {
+            for column in chunk.components().values() {
+                let values = column.list_array.values();
+                match column.descriptor.component.as_str() {
+                    "radial_mps" => {
+                        speeds_mps.extend_from_slice(values.as_primitive::<Float64Type>().values());
+                        units.extend(column.descriptor.component_type.map(|unit| unit.to_string()));
+                    }
+                    "exists" => exists.extend(values.as_boolean().iter().flatten()),
+                    _ => {}
+                }
+            }
+        }
+        let returns = films[0].frames.iter().filter_map(|frame| Some(&frame.radar_returns.as_ref()?[index]));
+        let returns: Vec<_> = returns.flatten().collect();
+        assert_eq!(speeds_mps, returns.iter().map(|one| one.measured.radial_mps).collect::<Vec<_>>(), "{side}");
+        assert_eq!(exists, returns.iter().map(|one| one.source.exists()).collect::<Vec<_>>(), "{side}");
+        assert!(exists.contains(&true) && exists.contains(&false), "{side}: {exists:?}");
+        assert_eq!(units, ["m/s"], "{side}");
+    }
+    let has = |data: &[Chunk], entity: &str| data.iter().any(|chunk| chunk.entity_path().to_string() == entity);
+    assert!(has(&data, "/states/5_rear_radars/with_MIS"));
+    let without = chunks(&[filmed_with("")], StoreKind::Recording);
+    assert!(!has(&without, "/states/5_rear_radars/with_MIS") && !has(&without, "/mis/world/ego/radars/left"));
+}
+
+#[test]
+fn the_states_name_the_fault_of_a_radar_and_when_the_ego_notices_it() {
+    let radar = "sensors.rear-radar = {}\n[[fault.rear-radar]]\nside = \"left\"\ndead = true\nfrom-s = 1.0\n";
+    let data = chunks(&[filmed_with(radar)], StoreKind::Recording);
+    let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/5_rear_radars/with_MIS");
+    let states: Vec<String> = rows.flat_map(|chunk| texts(chunk, "StateChange:state")).collect();
+    let states: Vec<&str> = states.iter().filter(|state| !state.is_empty()).map(String::as_str).collect();
+    let fault = "rear radar `left` dead";
+    let begins = ["healthy".to_owned(), format!("faulty, not noticed: {fault}"), format!("degraded: {fault}")];
+    assert_eq!(states.len(), 3, "{states:?}");
+    for (state, begin) in states.iter().zip(&begins) {
+        assert!(state.starts_with(begin.as_str()), "{states:?}");
+    }
 }
 
 #[test]
