@@ -13,7 +13,8 @@
 //! notice: a sensor that delivers nothing ([`Health::Failed`](crate::Health::Failed) after
 //! [`NOTICED_AFTER_SCANS`] scans), or the same bits again and again. A sensor whose dirt leaves
 //! less than half of its range reports [`Health::Degraded`](crate::Health::Degraded), as sensors
-//! with a blockage monitor do; no function acts on that. Glare, dirt on the camera, a blocked
+//! with a blockage monitor do; so does a rear radar whose time stamps show that it is late. No
+//! function acts on that. Glare, dirt on the camera, a blocked
 //! sector, noise, wrong time stamps, a wrong mounting, and a wrong odometry or map remain
 //! unnoticed.
 //!

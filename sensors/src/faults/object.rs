@@ -77,6 +77,22 @@ pub struct ObjectFaultConfig {
     pub ghost_closing_mps: Option<Num>,
 }
 
+/// Checks gap (m) and closing speed (m/s) of a ghost: a vehicle that does not exist.
+pub(super) fn check_ghost(
+    [gap, closing]: [&Option<Num>; 2],
+    parameters: &Parameters,
+) -> Result<Option<[f64; 2]>, ConfigError> {
+    let closing_mps = parameters.number_or(closing.as_ref(), "ghost-closing-mps", Range::closed(-30.0, 30.0), 0.0)?;
+    match gap {
+        Some(gap) => Ok(Some([parameters.number(gap, "ghost-gap-m", Range::closed(0.0, 200.0))?, closing_mps])),
+        None if closing.is_some() => {
+            let problem = Problem::Missing { needed: "the gap of the track that approaches" };
+            Err(ConfigError::new("ghost-gap-m", problem))
+        }
+        None => Ok(None),
+    }
+}
+
 /// The effects of faults of an object-level sensor at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ObjectFault {
@@ -175,26 +191,12 @@ impl ObjectFaultConfig {
                 number(&self.lateral_noise_m, "lateral-noise-m", NOISE_M)?,
             ],
             speed_noise_mps: number(&self.speed_noise_mps, "speed-noise-mps", NOISE_MPS)?,
-            ghost: self.check_ghost(parameters)?,
+            ghost: check_ghost([&self.ghost_gap_m, &self.ghost_closing_mps], parameters)?,
         };
         if fault == ObjectFault::default() && !self.has_numbers() {
             return Err(without_effect());
         }
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
-    }
-
-    /// Returns gap (m) and closing speed (m/s) of the track without a vehicle.
-    fn check_ghost(&self, parameters: &Parameters) -> Result<Option<[f64; 2]>, ConfigError> {
-        let closing = self.ghost_closing_mps.as_ref();
-        let closing_mps = parameters.number_or(closing, "ghost-closing-mps", Range::closed(-30.0, 30.0), 0.0)?;
-        match &self.ghost_gap_m {
-            Some(gap) => Ok(Some([parameters.number(gap, "ghost-gap-m", Range::closed(0.0, 200.0))?, closing_mps])),
-            None if closing.is_some() => {
-                let problem = Problem::Missing { needed: "the gap of the track that approaches" };
-                Err(ConfigError::new("ghost-gap-m", problem))
-            }
-            None => Ok(None),
-        }
     }
 
     /// Returns whether the entry names an effect by a number, which may be zero.

@@ -3,12 +3,13 @@
 //! They are the faults of an object-level sensor that a sensor that delivers single detections can
 //! have. For their sources see [`ObjectFaultConfig`](super::ObjectFaultConfig).
 
-use closecall_traffic::{ConfigError, Num, Parameters, Range, Side};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Range, Side};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::config::{SHARE, either, without_effect};
+use super::config::{ANGLE_DEG, MAX_DELAY_S, SHARE, either, without_effect};
 use super::list::{Combine, FaultList, check_span};
+use super::object::check_ghost;
 use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 
 /// Azimuths of a blocked sector (deg): all directions.
@@ -38,6 +39,17 @@ pub struct RadarFaultConfig {
     pub blocked_to_deg: Option<Num>,
     /// Share of the range that dirt, ice or a film of water leaves (-). Default: 1.
     pub range_share: Option<Num>,
+    /// Additional latency of each scan (s). Default: 0.
+    pub delay_s: Option<Num>,
+    /// Error of the mounting, unknown to the ego: rotation of the sensor about the vertical axis,
+    /// to the left seen from above (deg). It moves what is seen; the field of view stays. Default:
+    /// 0.
+    pub yaw_deg: Option<Num>,
+    /// Distance from the rear bumper of a detection without a vehicle, in the ego's lane, when the
+    /// fault begins (m).
+    pub ghost_gap_m: Option<Num>,
+    /// Speed at which that detection approaches the ego (m/s). Default: 0.
+    pub ghost_closing_mps: Option<Num>,
 }
 
 /// The effects of faults of a rear radar at one instant.
@@ -50,11 +62,24 @@ pub(crate) struct RadarFault {
     /// Azimuths of blocked sectors, from the right to the left (deg).
     pub(crate) blocked_deg: Sectors,
     pub(crate) range_share: f64,
+    pub(crate) delay_s: f64,
+    pub(crate) yaw_rad: f64,
+    /// Gap of the ghost when its fault begins (m), and the speed at which the gap closes (m/s).
+    pub(crate) ghost: Option<[f64; 2]>,
 }
 
 impl Default for RadarFault {
     fn default() -> Self {
-        Self { side: None, is_dead: false, dropout: 0.0, blocked_deg: [None; MAX_SECTORS], range_share: 1.0 }
+        Self {
+            side: None,
+            is_dead: false,
+            dropout: 0.0,
+            blocked_deg: [None; MAX_SECTORS],
+            range_share: 1.0,
+            delay_s: 0.0,
+            yaw_rad: 0.0,
+            ghost: None,
+        }
     }
 }
 
@@ -62,6 +87,17 @@ impl RadarFault {
     /// Returns whether the radar sees nothing at this azimuth (deg).
     pub(crate) fn hides(&self, azimuth_deg: f64) -> bool {
         self.blocked_deg.iter().flatten().any(|[from, to]| (*from..=*to).contains(&azimuth_deg))
+    }
+
+    /// Returns the additional latency in control steps.
+    pub(crate) fn delay_steps(&self) -> u64 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked to be at most some seconds"
+        )]
+        let steps = (self.delay_s / CONTROL_STEP.s()).round() as u64;
+        steps
     }
 
     /// Returns the same fault with a blocked sector.
@@ -81,6 +117,9 @@ impl Combine for RadarFault {
             dropout: either(self.dropout, other.dropout),
             blocked_deg: add_sectors(self.blocked_deg, other.blocked_deg),
             range_share: self.range_share * other.range_share,
+            delay_s: self.delay_s + other.delay_s,
+            yaw_rad: self.yaw_rad + other.yaw_rad,
+            ghost: other.ghost.or(self.ghost),
         }
     }
 }
@@ -92,7 +131,16 @@ impl RadarFaultConfig {
         entries: &[Self],
         parameters: &Parameters,
     ) -> Result<FaultList<RadarFault>, ConfigError> {
-        FaultList::check(key, entries, |entry| entry.check(parameters))
+        let list = FaultList::check(key, entries, |entry| entry.check(parameters))?;
+        // Entries of different radars do not add up.
+        for (index, sum) in
+            [Side::Left, Side::Right].into_iter().flat_map(|side| list.of_side(side).combinations().collect::<Vec<_>>())
+        {
+            // A sum of allowed values may exceed its limit by rounding.
+            let yaw_deg = (1e9 * sum.yaw_rad.to_degrees()).round() / 1e9;
+            ANGLE_DEG.check(yaw_deg, "yaw-deg").map_err(|error| error.within_index(index).within(key))?;
+        }
+        Ok(list)
     }
 
     fn check(&self, parameters: &Parameters) -> Result<(RadarFault, [f64; 2]), ConfigError> {
@@ -103,8 +151,12 @@ impl RadarFaultConfig {
             dropout: parameters.number_or(self.dropout.as_ref(), "dropout", SHARE, 0.0)?,
             blocked_deg: check_sector(sector, AZIMUTH_DEG, parameters)?,
             range_share: parameters.number_or(self.range_share.as_ref(), "range-share", RANGE_SHARE, 1.0)?,
+            delay_s: parameters.number_or(self.delay_s.as_ref(), "delay-s", Range::closed(0.0, MAX_DELAY_S), 0.0)?,
+            yaw_rad: parameters.number_or(self.yaw_deg.as_ref(), "yaw-deg", ANGLE_DEG, 0.0)?.to_radians(),
+            ghost: check_ghost([&self.ghost_gap_m, &self.ghost_closing_mps], parameters)?,
         };
-        let has_numbers = self.dropout.is_some() || self.range_share.is_some();
+        let has_numbers =
+            [&self.dropout, &self.range_share, &self.delay_s, &self.yaw_deg].into_iter().any(Option::is_some);
         if fault == RadarFault::default() && !has_numbers {
             return Err(without_effect());
         }

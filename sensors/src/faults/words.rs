@@ -208,11 +208,17 @@ impl Effects for RadarFault {
     }
 
     fn effects(&self) -> Vec<String> {
+        // It starts no track: `has_ghost` stays false.
+        let ghost =
+            self.ghost.map(|[gap_m, _]| format!("detects a ghost {gap_m:.0} m away, a vehicle that does not exist"));
         those([
             (self.is_dead, "dead".to_owned()),
             (self.dropout > 0.0, format!("loses {} of its detections", percent(self.dropout))),
             (self.blocked_deg.iter().any(Option::is_some), "partly blocked".to_owned()),
             (self.range_share < 1.0, format!("dirty ({} of the range left)", percent(self.range_share))),
+            (self.delay_s > 0.0, late(self.delay_s, 0.0)),
+            (self.yaw_rad != 0.0, "mounted askew".to_owned()),
+            (self.ghost.is_some(), ghost.unwrap_or_default()),
         ])
     }
 }

@@ -8,13 +8,14 @@
 use std::collections::VecDeque;
 
 use closecall_traffic::ego_frame::EgoFrame;
-use closecall_traffic::{CONTROL_STEP, Road, Side, StandardNormal, Stream, Time, VehicleState};
+use closecall_traffic::{CONTROL_STEP, Road, Side, StandardNormal, Stream, Time, VehicleState, maths};
 use rand::RngExt;
 
 use super::config::RearRadar;
-use super::measure::{Mount, Reflector, mirrored, rails_m};
+use super::measure::{Echo, Mount, Reflector, mirrored, rails_m};
 use super::output::{MountedRadars, RadarReturn, RadarSource};
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, RadarFault};
+use crate::object::DEGRADED_SHARE;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::{RadarDetection, RadarScan};
 use crate::{Health, NoiseKey, Scene, SensorError};
@@ -56,15 +57,17 @@ impl TargetStreams {
     }
 }
 
-/// A scan of both radars whose processing latency has not elapsed.
+/// A scan of one radar whose processing latency has not elapsed.
 #[derive(Clone, Debug)]
 struct PendingScan {
     time: Time,
+    /// Number of the step from which on the tracker has the scan of a radar that is not late.
+    usual_step: u64,
     /// Number of the step from which on the tracker may have the scan.
     due_step: u64,
     road: Road,
     ego: VehicleState,
-    detections: [Vec<RadarDetection>; 2],
+    detections: Vec<RadarDetection>,
 }
 
 /// The pair of radars with its state.
@@ -75,11 +78,17 @@ pub(crate) struct RearRadars {
     faults: FaultList<RadarFault>,
     targets: Vec<TargetStreams>,
     others: Vec<OtherVehicle>,
-    pending: VecDeque<PendingScan>,
+    /// The scans of the left and of the right radar that wait for the tracker. They arrive in their
+    /// order.
+    pending: [VecDeque<PendingScan>; 2],
     /// Time of the latest scan, and its detections by the left and by the right radar.
     latest: (Option<Time>, [Vec<RadarReturn>; 2]),
     /// Numbers of latest successive scans in which the left and the right radar delivered nothing.
     dead_scans: [u32; 2],
+    /// Numbers of latest successive scans whose time stamps show that they have arrived late.
+    late_scans: [u32; 2],
+    /// Whether dirt leaves so little of the range that the monitors of the radars report it.
+    are_dirty: [bool; 2],
 }
 
 /// What one radar looks at in one scan.
@@ -101,9 +110,11 @@ impl RearRadars {
             faults: FaultList::default(),
             targets: Vec::new(),
             others: Vec::new(),
-            pending: VecDeque::new(),
+            pending: [VecDeque::new(), VecDeque::new()],
             latest: (None, [Vec::new(), Vec::new()]),
             dead_scans: [0; 2],
+            late_scans: [0; 2],
+            are_dirty: [false; 2],
         }
     }
 
@@ -113,12 +124,15 @@ impl RearRadars {
     }
 
     /// Returns the health of the two radars together: failed if both have delivered nothing for a
-    /// while, and degraded if one of them has.
+    /// while. It is degraded if one of them has, if the time stamps have shown for a while that a
+    /// radar is late, or if dirt costs a radar more than half of its range.
     pub(crate) fn health(&self) -> Health {
         let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
-        match self.dead_scans.map(|scans| f64::from(scans) * self.model.period_s() >= noticed_s) {
+        let is_noticed = |scans: u32| f64::from(scans) * self.model.period_s() >= noticed_s;
+        let are_late = self.late_scans.map(is_noticed);
+        match self.dead_scans.map(is_noticed) {
             [true, true] => Health::Failed,
-            [false, false] => Health::Ok,
+            [false, false] if !(are_late.contains(&true) || self.are_dirty.contains(&true)) => Health::Ok,
             _ => Health::Degraded,
         }
     }
@@ -143,8 +157,13 @@ impl RearRadars {
         self.others = others;
         let (time, road, ego) = (scene.time, *believed.road, believed.ego.state);
         let returns = result?;
-        let detections = returns.each_ref().map(|returns| returns.iter().map(|one| one.measured).collect());
-        self.pending.push_back(PendingScan { time, due_step, road, ego, detections });
+        for ((side, pending), returns) in SIDES.into_iter().zip(&mut self.pending).zip(&returns) {
+            let late_steps = self.faults.of_side(side).at(time).map_or(0, |fault| fault.delay_steps());
+            let detections = returns.iter().map(|one| one.measured).collect();
+            let scan =
+                PendingScan { time, usual_step: due_step, due_step: due_step + late_steps, road, ego, detections };
+            pending.push_back(scan);
+        }
         self.latest = (Some(time), returns);
         Ok(())
     }
@@ -161,6 +180,8 @@ impl RearRadars {
         for (index, side) in SIDES.into_iter().enumerate() {
             let fault = self.faults.of_side(side).at(scene.time);
             let is_dead = fault.is_some_and(|fault| fault.is_dead);
+            let range_share = fault.map_or(1.0, |fault| fault.range_share);
+            self.are_dirty[index] = range_share < DEGRADED_SHARE;
             self.dead_scans[index] = if is_dead { self.dead_scans[index].saturating_add(1) } else { 0 };
             let mount = self.model.mount(side, scene.ego.vehicle.dimensions.length_m);
             let view = View { scene, frame: &frame, others: &others[..], mount, fault };
@@ -169,6 +190,7 @@ impl RearRadars {
                 let draws = self.targets[target].draw(usize::from(side != passing));
                 self.detect(view, place, draws, &mut returns[index]);
             }
+            returns[index].extend(self.ghost(view, side));
         }
         Ok(returns)
     }
@@ -205,10 +227,9 @@ impl RearRadars {
     fn detection(&self, view: View<'_>, point: &Reflector, draws: &Draws) -> Option<RadarDetection> {
         let model = &self.model;
         let fault = view.fault.unwrap_or_default();
-        let range_m = model.range_m * fault.range_share;
-        let echo = view.mount.echo(point, view.scene.ego.state.speed_mps, range_m)?;
+        let echo = self.echo(view, point)?;
         let probability = model.detection_probability * (1.0 - fault.dropout);
-        if fault.is_dead || fault.hides(echo.azimuth_rad.to_degrees()) || !(draws.detection < probability) {
+        if !(draws.detection < probability) {
             return None;
         }
         let turned = match view.scene.road.overtaking_side() {
@@ -219,12 +240,50 @@ impl RearRadars {
         Some(RadarDetection {
             sensor_m: view.mount.at_m,
             range_m: (echo.range_m + model.range_sd_m * range).max(0.0),
-            azimuth_rad: echo.azimuth_rad + turned * model.azimuth_sd_rad * azimuth,
+            azimuth_rad: echo.azimuth_rad + turned * model.azimuth_sd_rad * azimuth + fault.yaw_rad,
             radial_mps: echo.radial_mps + model.speed_sd_mps * speed,
             range_sd_m: model.range_sd_m,
             azimuth_sd_rad: model.azimuth_sd_rad,
             radial_sd_mps: model.speed_sd_mps,
         })
+    }
+
+    /// Returns what a radar with its faults measures of a point, without errors; `None` if the
+    /// faults leave nothing, or if the point is not in view.
+    fn echo(&self, view: View<'_>, point: &Reflector) -> Option<Echo> {
+        let fault = view.fault.unwrap_or_default();
+        let range_m = self.model.range_m * fault.range_share;
+        let echo = view.mount.echo(point, view.scene.ego.state.speed_mps, range_m)?;
+        (!fault.is_dead && !fault.hides(echo.azimuth_rad.to_degrees())).then_some(echo)
+    }
+
+    /// Returns the detection of a vehicle that does not exist, which a fault adds: in the ego's
+    /// lane, without random errors. It ends where it would reach the bumper.
+    fn ghost(&self, view: View<'_>, side: Side) -> Option<RadarReturn> {
+        let fault = view.fault?;
+        let [gap_m, closing_mps] = fault.ghost?;
+        let scene = view.scene;
+        let since_s = self.faults.of_side(side).since_s(scene.time, |fault| fault.ghost.is_some())?;
+        let gap_m = gap_m - closing_mps * since_s;
+        if !(gap_m >= 0.0) {
+            return None;
+        }
+        let (ego, ego_length_m) = (scene.ego.state, scene.ego.vehicle.dimensions.length_m);
+        let point = view.frame.point(ego.s_m - 0.5 * ego_length_m - gap_m, ego.d_m);
+        let (sin, cos) = maths::sin_cos(point.road_yaw_rad);
+        let speed_mps = ego.speed_mps + closing_mps;
+        let reflector = Reflector { at_m: [point.x_m, point.y_m], velocity_mps: [speed_mps * cos, speed_mps * sin] };
+        let echo = self.echo(view, &reflector)?;
+        let measured = RadarDetection {
+            sensor_m: view.mount.at_m,
+            range_m: echo.range_m,
+            azimuth_rad: echo.azimuth_rad + fault.yaw_rad,
+            radial_mps: echo.radial_mps,
+            range_sd_m: self.model.range_sd_m,
+            azimuth_sd_rad: self.model.azimuth_sd_rad,
+            radial_sd_mps: self.model.speed_sd_mps,
+        };
+        Some(RadarReturn { measured, source: RadarSource::Fault })
     }
 
     /// Returns the index of the streams of a vehicle, and adds them if the vehicle is new.
@@ -237,12 +296,29 @@ impl RearRadars {
     }
 
     /// Calls `use_scan` with each scan that the tracker may have in `step`, in the order of their
-    /// times, up to the time `before`, which is excluded.
+    /// times, up to the time `before`, which is excluded. Scans of both radars of the same time that
+    /// arrive in the same step are one.
+    ///
+    /// A scan is late if it arrives more than a period after its usual step.
     pub(crate) fn pass_due(&mut self, step: u64, before: Option<Time>, mut use_scan: impl FnMut(&RadarScan<'_>)) {
-        let is_next = |scan: &mut PendingScan| scan.due_step <= step && before.is_none_or(|before| scan.time < before);
-        while let Some(scan) = self.pending.pop_front_if(is_next) {
-            let [left, right] = &scan.detections;
-            use_scan(&RadarScan { time: scan.time, road: &scan.road, ego: scan.ego, detections: [left, right] });
+        let is_next = |scan: &PendingScan| scan.due_step <= step && before.is_none_or(|before| scan.time < before);
+        loop {
+            let next =
+                |pending: &VecDeque<PendingScan>| pending.front().filter(|scan| is_next(scan)).map(|scan| scan.time);
+            let Some(time) = self.pending.iter().filter_map(next).min() else { return };
+            let mut arrived: [Option<PendingScan>; 2] = [None, None];
+            for (arrived, pending) in arrived.iter_mut().zip(&mut self.pending) {
+                *arrived = pending.pop_front_if(|scan| scan.time == time && is_next(scan));
+            }
+            for (late_scans, scan) in self.late_scans.iter_mut().zip(&arrived) {
+                let Some(scan) = scan else { continue };
+                let late_s = step.saturating_sub(scan.usual_step) as f64 * CONTROL_STEP.s();
+                *late_scans = if late_s > self.model.period_s() { late_scans.saturating_add(1) } else { 0 };
+            }
+            let Some(first) = arrived.iter().flatten().next() else { return };
+            let detections =
+                arrived.each_ref().map(|scan| scan.as_ref().map(|scan| &scan.detections[..]).unwrap_or_default());
+            use_scan(&RadarScan { time, road: &first.road, ego: first.ego, detections });
         }
     }
 }
@@ -251,7 +327,6 @@ impl RearRadars {
 mod tests {
     use closecall_traffic::{ActorId, Check, Environment, Parameters, VehicleClass};
 
-    use super::super::measure::Echo;
     use super::*;
     use crate::SceneVehicle;
     use crate::radar::RearRadarConfig;
@@ -387,6 +462,69 @@ mod tests {
     }
 
     #[test]
+    fn a_radar_that_is_turned_to_the_left_sees_everything_farther_left_and_nothing_notices_it() {
+        let road = Road::straight(3);
+        let of_yaw = |yaw_deg: f64| {
+            let list = FaultList::throughout_of(RadarFault { yaw_rad: yaw_deg.to_radians(), ..RadarFault::default() });
+            let mut radars = radars("detection-probability = 1.0", 1).with_faults(list);
+            let [left, _] = detections(&mut radars, &road, &[car(38.0)], 100);
+            (left, radars.health())
+        };
+        let ((usual, _), (turned, health)) = (of_yaw(0.0), of_yaw(2.0));
+        assert_eq!((usual.len(), turned.len(), health), (100, 100, Health::Ok));
+        for (usual, turned) in usual.iter().zip(&turned) {
+            assert!((turned.azimuth_rad - usual.azimuth_rad - 2.0_f64.to_radians()).abs() < 1e-12);
+            assert_eq!((turned.range_m, turned.radial_mps), (usual.range_m, usual.radial_mps));
+        }
+    }
+
+    #[test]
+    fn a_ghost_approaches_in_the_lane_of_the_ego_and_ends_at_its_bumper() {
+        let road = Road::straight(3);
+        let fault = RadarFault { ghost: Some([20.0, 10.0]), ..RadarFault::default() };
+        let with = |fault: RadarFault| radars("", 1).with_faults(FaultList::throughout_of(fault));
+        let mut pair = with(fault);
+        // 2.4 s of scans: the ghost would reach the bumper after 2 s.
+        for measured in detections(&mut pair, &road, &[], 30) {
+            let first = measured[0];
+            let x_m = first.range_m * maths::cos(first.azimuth_rad);
+            let y_m = first.range_m * maths::sin(first.azimuth_rad);
+            assert!((x_m - 20.0).abs() < 1e-9 && (y_m + first.sensor_m[1]).abs() < 1e-9, "{first:?}");
+            assert!((-10.0..-9.9).contains(&first.radial_mps), "{first:?}");
+            assert!(measured.windows(2).all(|scans| scans[1].range_m < scans[0].range_m));
+            assert_eq!(measured.len(), 25);
+        }
+        detections(&mut pair, &road, &[], 1);
+        for returns in pair.mounted().returns {
+            assert_eq!(returns.iter().map(|one| one.source).collect::<Vec<_>>(), [RadarSource::Fault]);
+        }
+        let mut dead = with(RadarFault { is_dead: true, ..fault });
+        assert!(detections(&mut dead, &road, &[], 30).iter().all(Vec::is_empty));
+    }
+
+    #[test]
+    fn a_late_radar_is_noticed_by_its_time_stamps_and_the_other_one_arrives_in_time() {
+        let road = Road::straight(3);
+        for (delay_s, late, health) in [(0.2, 5, Health::Degraded), (0.08, 2, Health::Ok)] {
+            let fault = RadarFault { delay_s, side: Some(Side::Left), ..RadarFault::default() };
+            let mut radars = radars("detection-probability = 1.0", 1).with_faults(FaultList::throughout_of(fault));
+            let mut arrived = Vec::new();
+            for step in 0..40_i64 {
+                let number = u64::try_from(step).unwrap();
+                let scene = scene(&road, &[], CONTROL_STEP * step);
+                radars.sense([&scene, &scene], number).unwrap();
+                radars.pass_due(number, None, |scan| arrived.push((step, scan.time)));
+            }
+            // Each scan arrives twice: from the right radar at once, from the left one late.
+            let at_once = arrived.iter().filter(|(step, time)| CONTROL_STEP * *step == *time).count();
+            let later = arrived.iter().filter(|(step, time)| CONTROL_STEP * (*step - late) == *time).count();
+            assert_eq!(at_once, 20);
+            assert!(later >= 18 && arrived.len() == at_once + later, "{arrived:?}");
+            assert_eq!(radars.health(), health, "late by {delay_s} s");
+        }
+    }
+
+    #[test]
     fn another_vehicle_changes_no_error_of_the_first() {
         let road = Road::straight(3);
         let other = with_speed(scene_vehicle(2, VehicleClass::Car, EGO_S_M - 30.0, OWN_LANE_M - 3.75), 30.0);
@@ -428,7 +566,9 @@ mod tests {
         let blocked = |from_deg, to_deg| RadarFault::default().with_blocked(from_deg, to_deg);
         assert_eq!(seen(blocked(0.0, 10.0)), ([0, 0], Health::Ok));
         assert_eq!(seen(blocked(-10.0, 0.0)), ([100, 100], Health::Ok));
-        assert_eq!(seen(RadarFault { range_share: 0.4, ..usual }), ([0, 0], Health::Ok));
+        // The range of 90 m falls to 36 m, or to 54 m.
+        assert_eq!(seen(RadarFault { range_share: 0.4, ..usual }), ([0, 0], Health::Degraded));
+        assert_eq!(seen(RadarFault { range_share: 0.6, ..usual }), ([100, 100], Health::Ok));
         let ([left, _], _) = seen(RadarFault { dropout: 0.5, ..usual });
         assert!((30..=70).contains(&left), "{left}");
     }

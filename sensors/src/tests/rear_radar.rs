@@ -94,6 +94,27 @@ fn a_dead_radar_leaves_the_tracks_as_they_are_without_one_to_the_bit() {
 }
 
 #[test]
+fn a_late_radar_corrects_nothing_and_is_noticed() {
+    let alone = approach("", "", 1, Road::straight(3));
+    let late = approach(RADAR, "delay-s = 0.2", 1, Road::straight(3));
+    assert!(alone.tracks == late.tracks, "a scan that is older than the tracks is not used");
+    assert_eq!(late.health, Health::Degraded);
+}
+
+#[test]
+fn a_ghost_starts_no_track_and_a_wrong_mounting_and_a_ghost_remain_unnoticed() {
+    let ghost = "ghost-gap-m = 40.0\nghost-closing-mps = 5.0";
+    let road = Road::straight(3);
+    // The car is out of the LiDAR's view: only the radars detect something.
+    let blind = approach(&format!("rear-lidar.azimuth-deg = 80\n{RADAR}"), ghost, 0, road);
+    assert!(blind.tracks.iter().all(Vec::is_empty));
+    assert_eq!(blind.health, Health::Ok);
+    let counts = |fault: &str| approach(RADAR, fault, 0, road).tracks.iter().map(Vec::len).collect::<Vec<_>>();
+    assert_eq!(counts(ghost), counts(""), "the ghost is no track of its own");
+    assert_eq!(approach(RADAR, "yaw-deg = 3.0", 0, road).health, Health::Ok);
+}
+
+#[test]
 fn the_radar_starts_no_track_and_ghosts_leave_the_speed_right() {
     let road = Road::straight(3).with_guard_rails();
     let ghosts = "rear-radar = { range-m = 200, ghost-probability = 1.0 }\n";

@@ -35,6 +35,11 @@ fn entries_that_cannot_be_right_are_refused_by_their_keys() {
         ("[[surround]]\nblocked-from-deg = -1.0", "surround[0].blocked-to-deg", "two ends"),
         ("[[rear-radar]]\nside = \"left\"", "rear-radar[0].dead", "an effect of the fault"),
         ("[[rear-radar]]\ndropout = 1.5", "rear-radar[0].dropout", "from 0 to 1"),
+        ("[[rear-radar]]\ndelay-s = 0.5", "rear-radar[0].delay-s", "from 0 to 0.4"),
+        ("[[rear-radar]]\nyaw-deg = 6", "rear-radar[0].yaw-deg", "from -5 to 5"),
+        ("[[rear-radar]]\nyaw-deg = 3\n".repeat(2).as_str(), "rear-radar[0].yaw-deg", "from -5 to 5"),
+        ("[[rear-radar]]\nghost-closing-mps = 3.0", "rear-radar[0].ghost-gap-m", "the gap"),
+        ("[[rear-radar]]\nghost-gap-m = 201", "rear-radar[0].ghost-gap-m", "from 0 to 200"),
         ("[[rear-radar]]\nrange-share = 0.0", "rear-radar[0].range-share", "above 0 and up to 1"),
         ("[[surround]]\njitter-s = -0.1", "surround[0].jitter-s", "from 0 to 0.4"),
         ("[[rear-object]]\nrange-noise-m = 6", "rear-object[0].range-noise-m", "from 0 to 5"),
@@ -56,6 +61,17 @@ fn entries_that_cannot_be_right_are_refused_by_their_keys() {
     let five = "[[rear-lidar]]\ndead = true\n".repeat(5);
     assert!(refused(&five).contains("at most four"), "{}", refused(&five));
     assert!(refused("[[rear-lidar]]\ndeaf = true").contains("deaf"));
+}
+
+#[test]
+fn errors_of_the_mounting_of_different_radars_do_not_add_up() {
+    let entry = |side: &str| format!("[[rear-radar]]\nyaw-deg = 3.0\n{side}\n");
+    let (left, right, both) = (entry("side = \"left\""), entry("side = \"right\""), entry(""));
+    faults(&format!("{left}{right}")).unwrap();
+    for text in [format!("{right}{right}"), format!("{both}{left}")] {
+        let message = faults(&text).unwrap_err();
+        assert!(message.contains("rear-radar[0].yaw-deg") && message.contains("is 6"), "{message}");
+    }
 }
 
 #[test]
