@@ -104,7 +104,10 @@ impl FullPerception {
     ) -> Self {
         let latency_s = self.model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
         let lidars = self.model.rear_lidars();
-        Self { outside: program.map(|program| Outside::new(program, lidars.collect(), camera, latency_s)), ..self }
+        let sensors = (lidars.collect(), self.model.rear_radar);
+        let outside = program.map(|program| Outside::new(program, sensors, camera, latency_s));
+        let rear = if outside.is_some() { self.rear.map(LidarChain::with_program) } else { self.rear };
+        Self { outside, rear, ..self }
     }
 
     /// Returns the same sensors without the sensors that look back.

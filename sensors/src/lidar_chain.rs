@@ -108,6 +108,11 @@ impl LidarChain {
         Self { radars, ..self }
     }
 
+    /// Returns the same chain, whose radars keep their scans for a program, too.
+    pub(crate) fn with_program(self) -> Self {
+        Self { radars: self.radars.map(RearRadars::with_program), ..self }
+    }
+
     /// Returns the same chain with faults of its radars.
     pub(crate) fn with_radar_faults(self, faults: FaultList<RadarFault>) -> Self {
         Self { radars: self.radars.map(|radars| radars.with_faults(faults)), ..self }
@@ -167,7 +172,9 @@ impl LidarChain {
             }
         }
         if !scans.is_empty() {
-            match outside.ask([seen.scene, seen.believed], &arrived)? {
+            let due_step = self.step + self.latency_steps as u64;
+            let radar_scans = self.radars.as_mut().map(|radars| radars.arrived(due_step)).unwrap_or_default();
+            match outside.ask([seen.scene, seen.believed], (&arrived, &radar_scans))? {
                 PerceptionAnswer::Detections(detections) => {
                     // The boxes belong to no LiDAR alone. They come with the first scan that has
                     // arrived.

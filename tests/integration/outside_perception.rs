@@ -110,6 +110,20 @@ fn a_program_gets_the_images_that_it_is_to_have() {
 }
 
 #[test]
+fn a_program_gets_the_scans_of_rear_radars_and_none_without_radars() {
+    if !has_python() {
+        return;
+    }
+    // The program checks keys, rate and values itself.
+    let settings = ["duration-s=4", "sensors.rear-camera.pipeline=off", "sensors.rear-radar={ range-m = 300 }"];
+    let args: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+    for kind in ["tracks", "detections"] {
+        stdout(&run("low-thw-overtake", &format!("{GROUPS} {kind} needs-radars"), &args), 0);
+    }
+    failure("tracks", "needs-radars", &[]);
+}
+
+#[test]
 fn a_run_with_a_perception_has_the_same_bits_again() {
     if !has_python() {
         return;

@@ -19,7 +19,7 @@ mod settings;
 
 pub(crate) use image::OutsideCamera;
 pub use image::{CameraMount, OutsideImage};
-pub use mount::LidarMount;
+pub use mount::{LidarMount, RadarMount};
 pub(crate) use outside::Outside;
 pub use pose::Pose;
 pub use settings::{
@@ -28,9 +28,10 @@ pub use settings::{
 };
 pub(crate) use settings::{ProgramChecks, check_program};
 
-use closecall_traffic::{Dimensions, Road, Time, Track, VehicleState};
+use closecall_traffic::{Dimensions, Road, Side, Time, Track, VehicleState};
 
 use crate::lidar::LidarScan;
+use crate::tracking::RadarDetection;
 use crate::{Detection, SensorError};
 
 /// A scan as a program gets it.
@@ -44,6 +45,17 @@ pub struct OutsideScan {
     pub scan: LidarScan,
 }
 
+/// A scan of a rear radar as a program gets it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutsideRadarScan {
+    /// Side of the ego on which the radar is.
+    pub side: Side,
+    /// Time of the scan. A late scan is older than the question.
+    pub time: Time,
+    /// The detections, ghosts included: nothing tells them apart.
+    pub detections: Vec<RadarDetection>,
+}
+
 /// What a program is asked in one control step.
 #[derive(Clone, Copy, Debug)]
 pub struct PerceptionQuestion<'a> {
@@ -51,12 +63,17 @@ pub struct PerceptionQuestion<'a> {
     pub time: Time,
     /// The scans that have arrived. None if all sensors whose scans were due are silent.
     pub scans: &'a [OutsideScan],
+    /// The scans of the rear radars that have arrived since the last question, in the order of their
+    /// times for each radar.
+    pub radar_scans: &'a [OutsideRadarScan],
     /// The image of the rear camera, if one is due and the program gets images.
     pub image: Option<&'a OutsideImage>,
     /// The rear camera, if the program gets its images.
     pub camera: Option<CameraMount>,
     /// The LiDARs that look back, in the order of the scenario.
     pub lidars: &'a [LidarMount],
+    /// The rear radars: the left and the right one, or none.
+    pub radars: &'a [RadarMount],
     /// The ego's motion and place on the road, as its odometry and its map give them.
     pub ego: VehicleState,
     /// The ego's place in a frame that does not move.

@@ -1,4 +1,6 @@
-//! What a program is told of a LiDAR.
+//! What a program is told of a LiDAR and of a rear radar.
+
+use closecall_traffic::Side;
 
 use crate::lidar::Lidar;
 
@@ -44,4 +46,29 @@ impl LidarMount {
             period_s: lidar.kind.period_s(),
         }
     }
+}
+
+/// A rear radar as a program is told of it, in the frame of the ego.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadarMount {
+    /// Side of the ego on which the radar is.
+    pub side: Side,
+    /// Position ahead of the ego's centre (m).
+    pub x_m: f64,
+    /// Position to the left of it (m).
+    pub y_m: f64,
+    /// Azimuth of the axis (rad): 0 is straight behind, positive to the ego's left.
+    pub azimuth_rad: f64,
+    /// Half of the horizontal field of view (rad).
+    pub half_field_rad: f64,
+    /// Range up to which vehicles are detected (m).
+    pub range_m: f64,
+    /// Time from a scan to the next (s).
+    pub period_s: f64,
+    /// Standard deviation of a range (m).
+    pub range_sd_m: f64,
+    /// Standard deviation of an azimuth (rad).
+    pub azimuth_sd_rad: f64,
+    /// Standard deviation of a radial speed (m/s).
+    pub radial_sd_mps: f64,
 }

@@ -4,8 +4,12 @@ use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{Time, Track, VehicleState};
 
 use super::answered::OutsideTracks;
-use super::{LidarMount, OutsideCamera, OutsideScan, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, Pose};
+use super::{
+    LidarMount, OutsideCamera, OutsideRadarScan, OutsideScan, PerceptionAnswer, PerceptionProgram, PerceptionQuestion,
+    Pose, RadarMount,
+};
 use crate::lidar::Lidar;
+use crate::radar::RearRadar;
 use crate::tracking::TrackList;
 use crate::{Scene, SensorError};
 
@@ -14,6 +18,8 @@ pub(crate) struct Outside {
     program: Box<dyn PerceptionProgram>,
     lidars: Vec<Lidar>,
     mounts: Vec<LidarMount>,
+    radar: Option<RearRadar>,
+    radar_mounts: Vec<RadarMount>,
     camera: Option<OutsideCamera>,
     latency_s: f64,
     /// The ego's state at the first question, which is the frame of all poses.
@@ -22,18 +28,28 @@ pub(crate) struct Outside {
 }
 
 impl Outside {
-    /// Creates the program of a run, whose LiDARs that look back are these, in their order.
+    /// Creates the program of a run, whose LiDARs and radars that look back are these, in their order.
     /// `latency_s` is the time from a scan to the tracks that a controller gets of it (s).
     pub(crate) fn new(
         program: Box<dyn PerceptionProgram>,
-        lidars: Vec<Lidar>,
+        (lidars, radar): (Vec<Lidar>, Option<RearRadar>),
         camera: Option<OutsideCamera>,
         latency_s: f64,
     ) -> Self {
-        Self { program, lidars, mounts: Vec::new(), camera, latency_s, first: None, tracks: OutsideTracks::default() }
+        Self {
+            program,
+            lidars,
+            mounts: Vec::new(),
+            radar,
+            radar_mounts: Vec::new(),
+            camera,
+            latency_s,
+            first: None,
+            tracks: OutsideTracks::default(),
+        }
     }
 
-    /// Asks the program about scans and an image of the scene. `believed` is the scene as the ego
+    /// Asks the program about scans of the LiDARs and of the radars, and an image of the scene. `believed` is the scene as the ego
     /// believes it to be.
     ///
     /// # Errors
@@ -41,20 +57,23 @@ impl Outside {
     pub(crate) fn ask(
         &mut self,
         [scene, believed]: [&Scene<'_>; 2],
-        scans: &[OutsideScan],
+        (scans, radar_scans): (&[OutsideScan], &[OutsideRadarScan]),
     ) -> Result<PerceptionAnswer, SensorError> {
         let pose = self.pose(believed);
         let length_m = believed.ego.vehicle.dimensions.length_m;
         if self.mounts.is_empty() {
             self.mounts.extend(self.lidars.iter().map(|lidar| LidarMount::of(lidar, length_m)));
+            self.radar_mounts.extend(self.radar.iter().flat_map(|radar| radar.mounts(length_m)));
         }
         let image = self.camera.as_mut().and_then(|camera| camera.image(scene));
         self.program.perceive(&PerceptionQuestion {
             time: believed.time,
             scans,
+            radar_scans,
             image: image.as_ref(),
             camera: self.camera.as_ref().map(|camera| camera.mount(length_m)),
             lidars: &self.mounts,
+            radars: &self.radar_mounts,
             ego: believed.ego.state,
             pose,
             size: believed.ego.vehicle.dimensions,

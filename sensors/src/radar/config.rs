@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::measure::Mount;
+use crate::external::RadarMount;
 
 /// Distance of each radar from the centre line of the ego (m; assumption): behind the bumper, near
 /// the corners of a car. Plausible: 0.5 to 0.9.
@@ -130,6 +131,26 @@ impl RearRadar {
             axis_rad: outward * self.yaw_rad,
             half_field_rad: self.half_field_rad,
         }
+    }
+
+    /// Returns the left and the right radar of an ego of this length (m), as a perception program is
+    /// told of them.
+    pub fn mounts(&self, ego_length_m: f64) -> [RadarMount; 2] {
+        [Side::Left, Side::Right].map(|side| {
+            let Mount { at_m: [x_m, y_m], axis_rad, half_field_rad } = self.mount(side, ego_length_m);
+            RadarMount {
+                side,
+                x_m,
+                y_m,
+                azimuth_rad: axis_rad,
+                half_field_rad,
+                range_m: self.range_m,
+                period_s: self.period_s(),
+                range_sd_m: self.range_sd_m,
+                azimuth_sd_rad: self.azimuth_sd_rad,
+                radial_sd_mps: self.speed_sd_mps,
+            }
+        })
     }
 
     /// Returns the azimuths that the two radars see together (deg), from straight behind.

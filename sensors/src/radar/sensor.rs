@@ -14,6 +14,7 @@ use rand::RngExt;
 use super::config::RearRadar;
 use super::measure::{Echo, Mount, Reflector, mirrored, rails_m};
 use super::output::{MountedRadars, RadarReturn, RadarSource};
+use crate::external::OutsideRadarScan;
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, RadarFault};
 use crate::object::DEGRADED_SHARE;
 use crate::surroundings::{OtherVehicle, transform_scene};
@@ -81,6 +82,9 @@ pub(crate) struct RearRadars {
     /// The scans of the left and of the right radar that wait for the tracker. They arrive in their
     /// order.
     pending: [VecDeque<PendingScan>; 2],
+    /// The scans that a program has not had, each with the number of the step from which on the
+    /// tracker may have it; `None` without a program.
+    untold: Option<VecDeque<(u64, OutsideRadarScan)>>,
     /// Time of the latest scan, and its detections by the left and by the right radar.
     latest: (Option<Time>, [Vec<RadarReturn>; 2]),
     /// Numbers of latest successive scans in which the left and the right radar delivered nothing.
@@ -111,6 +115,7 @@ impl RearRadars {
             targets: Vec::new(),
             others: Vec::new(),
             pending: [VecDeque::new(), VecDeque::new()],
+            untold: None,
             latest: (None, [Vec::new(), Vec::new()]),
             dead_scans: [0; 2],
             late_scans: [0; 2],
@@ -121,6 +126,20 @@ impl RearRadars {
     /// Returns the same radars with faults.
     pub(crate) fn with_faults(self, faults: FaultList<RadarFault>) -> Self {
         Self { faults, ..self }
+    }
+
+    /// Returns the same radars, which keep their scans for a program.
+    pub(crate) fn with_program(self) -> Self {
+        Self { untold: Some(VecDeque::new()), ..self }
+    }
+
+    /// Returns the scans that have arrived and that no program has had. The tracker may have a scan
+    /// that arrives in this step from `due_step` on. A dead radar has no scans.
+    pub(crate) fn arrived(&mut self, due_step: u64) -> Vec<OutsideRadarScan> {
+        let Some(untold) = &mut self.untold else { return Vec::new() };
+        let (arrived, later): (VecDeque<_>, VecDeque<_>) = untold.drain(..).partition(|(due, _)| *due <= due_step);
+        *untold = later;
+        arrived.into_iter().map(|(_, scan)| scan).collect()
     }
 
     /// Returns the health of the two radars together: failed if both have delivered nothing for a
@@ -158,11 +177,16 @@ impl RearRadars {
         let (time, road, ego) = (scene.time, *believed.road, believed.ego.state);
         let returns = result?;
         for ((side, pending), returns) in SIDES.into_iter().zip(&mut self.pending).zip(&returns) {
-            let late_steps = self.faults.of_side(side).at(time).map_or(0, |fault| fault.delay_steps());
-            let detections = returns.iter().map(|one| one.measured).collect();
-            let scan =
-                PendingScan { time, usual_step: due_step, due_step: due_step + late_steps, road, ego, detections };
-            pending.push_back(scan);
+            let fault = self.faults.of_side(side).at(time).unwrap_or_default();
+            let (usual_step, due_step) = (due_step, due_step + fault.delay_steps());
+            let detections: Vec<RadarDetection> = returns.iter().map(|one| one.measured).collect();
+            if let Some(untold) = self.untold.as_mut().filter(|_| !fault.is_dead) {
+                // The scans of a radar arrive in their order.
+                let latest = untold.iter().rev().find(|(_, scan)| scan.side == side);
+                let due_step = due_step.max(latest.map_or(0, |(due_step, _)| *due_step));
+                untold.push_back((due_step, OutsideRadarScan { side, time, detections: detections.clone() }));
+            }
+            pending.push_back(PendingScan { time, usual_step, due_step, road, ego, detections });
         }
         self.latest = (Some(time), returns);
         Ok(())
@@ -522,6 +546,34 @@ mod tests {
             assert!(later >= 18 && arrived.len() == at_once + later, "{arrived:?}");
             assert_eq!(radars.health(), health, "late by {delay_s} s");
         }
+    }
+
+    #[test]
+    fn a_program_gets_each_scan_once_when_it_arrives_and_none_of_a_dead_radar() {
+        let road = Road::straight(3);
+        let told = |fault: RadarFault| {
+            let radars = radars("detection-probability = 1.0", 1).with_faults(FaultList::throughout_of(fault));
+            let mut pair = radars.with_program();
+            let mut told = Vec::new();
+            for step in 0..20_i64 {
+                let number = u64::try_from(step).unwrap();
+                let others = [car(38.0)];
+                let scene = scene(&road, &others, CONTROL_STEP * step);
+                // The tracker has a latency of three steps, the program has none.
+                pair.sense([&scene, &scene], number + 3).unwrap();
+                told.extend(pair.arrived(number + 3).into_iter().map(|scan| (step, scan)));
+            }
+            told
+        };
+        let usual = told(RadarFault::default());
+        assert_eq!(usual.len(), 20, "ten scans of each radar");
+        assert!(usual.iter().all(|(step, scan)| CONTROL_STEP * *step == scan.time && scan.detections.len() == 1));
+        let late = told(RadarFault { delay_s: 0.2, side: Some(Side::Left), ..RadarFault::default() });
+        let left: Vec<_> = late.iter().filter(|(_, scan)| scan.side == Side::Left).collect();
+        assert_eq!((left.len(), late.len()), (8, 18));
+        assert!(left.iter().all(|(step, scan)| CONTROL_STEP * (*step - 5) == scan.time));
+        let dead = told(RadarFault { is_dead: true, side: Some(Side::Right), ..RadarFault::default() });
+        assert!(dead.len() == 10 && dead.iter().all(|(_, scan)| scan.side == Side::Left));
     }
 
     #[test]

@@ -13,11 +13,11 @@
 //!
 //! # Protocol, version 1
 //! 1. Closecall sends `{"type":"hello","kind":"perception","protocol":1,"control_step_s":0.04,"latency_s":…,"ego":{…},"road":{…},
-//!    "lidars":[…]}`.
+//!    "lidars":[…],"radars":[…]}`.
 //! 2. The process answers `{"type":"hello","protocol":1,"answers":"detections"|"tracks"}` within 10 s, optionally with `name` and
 //!    `version`.
 //! 3. At each control step in which a scan of some LiDAR is due, Closecall sends `{"type":"scans","time_s":…,"time_ns":…,"odometry":{…},
-//!    "pose":{…},"scans":[…]}`.
+//!    "pose":{…},"scans":[…],"radar_scans":[…]}`. A run without rear radars has neither `radars` nor `radar_scans`.
 //! 4. The process answers `{"time_ns":…,"detections":[…]}` or `{"time_ns":…,"tracks":[…]}`, as it has announced.
 //! 5. At the end of the run Closecall closes the standard input, and reads what is left, which must be nothing.
 //!

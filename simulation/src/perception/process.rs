@@ -6,7 +6,7 @@ use std::time::Instant;
 use closecall_scenarios::Scenario;
 use closecall_sensors::SensorError;
 use closecall_sensors::external::{
-    CameraMount, LidarMount, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, ProgramSettings,
+    CameraMount, LidarMount, PerceptionAnswer, PerceptionProgram, PerceptionQuestion, ProgramSettings, RadarMount,
 };
 use closecall_traffic::{CONTROL_STEP, Time};
 
@@ -99,9 +99,10 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
     let model = scenario.sensors.full_model();
     let size = scenario.actors[scenario.ego].vehicle.dimensions;
     let lidars: Vec<LidarMount> = model.rear_lidars().map(|lidar| LidarMount::of(&lidar, size.length_m)).collect();
+    let radars: Vec<RadarMount> = model.rear_radar.iter().flat_map(|radar| radar.mounts(size.length_m)).collect();
     let latency_s = model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
     let camera = program.images.map(|images| CameraMount::of(scenario.sensors.camera(), images, size.length_m));
-    let setup = Setup { size, road: &scenario.road, lidars: &lidars, camera, latency_s };
+    let setup = Setup { size, road: &scenario.road, lidars: &lidars, radars: &radars, camera, latency_s };
     let (child, identity, _) = greet(program, &setup).ok()?;
     let open_files = child.open_files();
     Some((identity, open_files))

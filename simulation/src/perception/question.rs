@@ -2,9 +2,12 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use closecall_sensors::external::{CameraMount, LidarMount, OutsideImage, OutsideScan, PerceptionQuestion, Pose};
+use closecall_sensors::external::{
+    CameraMount, LidarMount, OutsideImage, OutsideRadarScan, OutsideScan, PerceptionQuestion, Pose, RadarMount,
+};
 use closecall_sensors::lidar::MirrorSide;
-use closecall_traffic::{CONTROL_STEP, Dimensions, Road};
+use closecall_sensors::tracking::RadarDetection;
+use closecall_traffic::{CONTROL_STEP, Dimensions, Road, Side};
 use serde::Serialize;
 
 use crate::controller::exec::{PROTOCOL, RoadMessage, to_line};
@@ -20,6 +23,9 @@ enum Message<'a> {
         ego: EgoMessage,
         road: RoadMessage,
         lidars: Vec<LidarMessage>,
+        /// Absent without radars, as in each question.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        radars: Option<Vec<RadarMessage>>,
         camera: Option<CameraMessage>,
     },
     Scans {
@@ -28,6 +34,8 @@ enum Message<'a> {
         odometry: OdometryMessage,
         pose: PoseMessage,
         scans: Vec<ScanMessage<'a>>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        radar_scans: Option<Vec<RadarScanMessage>>,
         image: Option<ImageMessage>,
     },
 }
@@ -50,6 +58,34 @@ struct LidarMessage {
     layers: usize,
     columns: usize,
     period_s: f64,
+}
+
+#[derive(Serialize)]
+struct RadarMessage {
+    side: &'static str,
+    x_m: f64,
+    y_m: f64,
+    azimuth_rad: f64,
+    half_field_rad: f64,
+    range_m: f64,
+    period_s: f64,
+    range_sd_m: f64,
+    azimuth_sd_rad: f64,
+    radial_sd_mps: f64,
+}
+
+#[derive(Serialize)]
+struct RadarScanMessage {
+    side: &'static str,
+    time_ns: i64,
+    detections: Vec<RadarDetectionMessage>,
+}
+
+#[derive(Serialize)]
+struct RadarDetectionMessage {
+    range_m: f64,
+    azimuth_rad: f64,
+    radial_mps: f64,
 }
 
 #[derive(Serialize)]
@@ -110,6 +146,7 @@ pub(super) struct Setup<'a> {
     pub(super) size: Dimensions,
     pub(super) road: &'a Road,
     pub(super) lidars: &'a [LidarMount],
+    pub(super) radars: &'a [RadarMount],
     pub(super) camera: Option<CameraMount>,
     pub(super) latency_s: f64,
 }
@@ -117,8 +154,8 @@ pub(super) struct Setup<'a> {
 impl<'a> Setup<'a> {
     /// Returns what is told before a question.
     pub(super) fn of(question: &PerceptionQuestion<'a>) -> Self {
-        let PerceptionQuestion { size, road, lidars, camera, latency_s, .. } = *question;
-        Self { size, road, lidars, camera, latency_s }
+        let PerceptionQuestion { size, road, lidars, radars, camera, latency_s, .. } = *question;
+        Self { size, road, lidars, radars, camera, latency_s }
     }
 
     /// Returns the first message.
@@ -131,6 +168,7 @@ impl<'a> Setup<'a> {
             ego: EgoMessage { length_m: self.size.length_m, width_m: self.size.width_m },
             road: RoadMessage::of(self.road),
             lidars: self.lidars.iter().map(lidar_message).collect(),
+            radars: (!self.radars.is_empty()).then(|| self.radars.iter().map(radar_message).collect()),
             camera: self.camera.map(camera_message),
         })
     }
@@ -152,6 +190,8 @@ pub(super) fn scans(question: &PerceptionQuestion<'_>) -> Vec<u8> {
         },
         pose: PoseMessage { x_m, y_m, yaw_rad },
         scans: question.scans.iter().map(scan_message).collect(),
+        radar_scans: (!question.radars.is_empty())
+            .then(|| question.radar_scans.iter().map(radar_scan_message).collect()),
         image: question.image.map(image_message),
     })
 }
@@ -159,6 +199,42 @@ pub(super) fn scans(question: &PerceptionQuestion<'_>) -> Vec<u8> {
 fn lidar_message(lidar: &LidarMount) -> LidarMessage {
     let LidarMount { name, x_m, y_m, z_m, azimuth_rad, half_field_rad, range_m, layers, columns, period_s } = *lidar;
     LidarMessage { name, x_m, y_m, z_m, azimuth_rad, half_field_rad, range_m, layers, columns, period_s }
+}
+
+fn radar_message(radar: &RadarMount) -> RadarMessage {
+    let RadarMount { side, x_m, y_m, azimuth_rad, half_field_rad, range_m, period_s, .. } = *radar;
+    let RadarMount { range_sd_m, azimuth_sd_rad, radial_sd_mps, .. } = *radar;
+    RadarMessage {
+        side: side_word(side),
+        x_m,
+        y_m,
+        azimuth_rad,
+        half_field_rad,
+        range_m,
+        period_s,
+        range_sd_m,
+        azimuth_sd_rad,
+        radial_sd_mps,
+    }
+}
+
+fn radar_scan_message(scan: &OutsideRadarScan) -> RadarScanMessage {
+    let message = |detection: &RadarDetection| {
+        let RadarDetection { range_m, azimuth_rad, radial_mps, .. } = *detection;
+        RadarDetectionMessage { range_m, azimuth_rad, radial_mps }
+    };
+    RadarScanMessage {
+        side: side_word(scan.side),
+        time_ns: scan.time.ns(),
+        detections: scan.detections.iter().map(message).collect(),
+    }
+}
+
+const fn side_word(side: Side) -> &'static str {
+    match side {
+        Side::Left => "left",
+        Side::Right => "right",
+    }
 }
 
 fn camera_message(camera: CameraMount) -> CameraMessage {
