@@ -54,7 +54,7 @@ pub struct RearRadarConfig {
     pub yaw_deg: Num,
     /// Half of the horizontal field of view (deg). Default: 75.
     pub half_field_deg: Num,
-    /// Range up to which vehicles are detected (m). Default: 90.
+    /// Range up to which vehicles are detected in dry air (m). Default: 90.
     pub range_m: Num,
     /// Scans per second (Hz). Default: 12.5.
     pub rate_hz: Num,

@@ -17,12 +17,14 @@
 //! - **Radial speed.** The sensor measures the rate of change of the range, (v − v₀)·e, with the
 //!   velocities v of the vehicle and v₀ of the ego, and the direction e from the sensor to the
 //!   point. Nothing tells the speed across the line of sight.
+//! - **Rain** shortens the range (`rain.rs`). It adds no false alarms.
 //! - **Ghosts.** A guard rail is a mirror. The detection of the mirror image has the range, the
 //!   angle and the radial speed of an image that moves as the vehicle does, with its lateral speed
 //!   reversed (Kraus et al. 2020, *Using machine learning to detect ghost images in automotive
 //!   radar*, arXiv 2007.05280: such images are usual at flat surfaces).
 //! - **Neglected** are the yaw rate of the ego times the lever arm of the sensor (0.1 m/s in a bend
-//!   of 1000 m at 40 m/s), clutter, interference, and weather.
+//!   of 1000 m at 40 m/s), clutter, interference, and
+//!   weather except rain.
 //!
 //! The radars start no tracks. They correct the speed of tracks that the LiDARs have
 //! ([`crate::tracking::RadarScan`]).
@@ -30,6 +32,7 @@
 mod config;
 mod measure;
 mod output;
+mod rain;
 mod sensor;
 
 pub use config::{RearRadar, RearRadarConfig};

@@ -14,6 +14,7 @@ use rand::RngExt;
 use super::config::RearRadar;
 use super::measure::{Echo, Mount, Reflector, mirrored, rails_m};
 use super::output::{MountedRadars, RadarReturn, RadarSource};
+use super::rain::range_in_rain_m;
 use crate::external::OutsideRadarScan;
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, RadarFault};
 use crate::object::DEGRADED_SHARE;
@@ -91,8 +92,8 @@ pub(crate) struct RearRadars {
     dead_scans: [u32; 2],
     /// Numbers of latest successive scans whose time stamps show that they have arrived late.
     late_scans: [u32; 2],
-    /// Whether dirt leaves so little of the range that the monitors of the radars report it.
-    are_dirty: [bool; 2],
+    /// Whether dirt and rain leave so little of the range that the monitors of the radars report it.
+    are_short: [bool; 2],
 }
 
 /// What one radar looks at in one scan.
@@ -119,7 +120,7 @@ impl RearRadars {
             latest: (None, [Vec::new(), Vec::new()]),
             dead_scans: [0; 2],
             late_scans: [0; 2],
-            are_dirty: [false; 2],
+            are_short: [false; 2],
         }
     }
 
@@ -144,14 +145,15 @@ impl RearRadars {
 
     /// Returns the health of the two radars together: failed if both have delivered nothing for a
     /// while. It is degraded if one of them has, if the time stamps have shown for a while that a
-    /// radar is late, or if dirt costs a radar more than half of its range.
+    /// radar is late, or if dirt and rain cost a radar more than half of its
+    /// range.
     pub(crate) fn health(&self) -> Health {
         let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
         let is_noticed = |scans: u32| f64::from(scans) * self.model.period_s() >= noticed_s;
         let are_late = self.late_scans.map(is_noticed);
         match self.dead_scans.map(is_noticed) {
             [true, true] => Health::Failed,
-            [false, false] if !(are_late.contains(&true) || self.are_dirty.contains(&true)) => Health::Ok,
+            [false, false] if !(are_late.contains(&true) || self.are_short.contains(&true)) => Health::Ok,
             _ => Health::Degraded,
         }
     }
@@ -204,8 +206,8 @@ impl RearRadars {
         for (index, side) in SIDES.into_iter().enumerate() {
             let fault = self.faults.of_side(side).at(scene.time);
             let is_dead = fault.is_some_and(|fault| fault.is_dead);
-            let range_share = fault.map_or(1.0, |fault| fault.range_share);
-            self.are_dirty[index] = range_share < DEGRADED_SHARE;
+            let range_m = self.range_m(fault, scene);
+            self.are_short[index] = range_m < DEGRADED_SHARE * self.model.range_m;
             self.dead_scans[index] = if is_dead { self.dead_scans[index].saturating_add(1) } else { 0 };
             let mount = self.model.mount(side, scene.ego.vehicle.dimensions.length_m);
             let view = View { scene, frame: &frame, others: &others[..], mount, fault };
@@ -272,11 +274,17 @@ impl RearRadars {
         })
     }
 
+    /// Returns the range of a radar with this fault, in the rain of the scene (m).
+    fn range_m(&self, fault: Option<RadarFault>, scene: &Scene<'_>) -> f64 {
+        let clean_share = fault.map_or(1.0, |fault| fault.range_share);
+        range_in_rain_m(self.model.range_m * clean_share, scene.environment.rain_mm_per_h)
+    }
+
     /// Returns what a radar with its faults measures of a point, without errors; `None` if the
     /// faults leave nothing, or if the point is not in view.
     fn echo(&self, view: View<'_>, point: &Reflector) -> Option<Echo> {
         let fault = view.fault.unwrap_or_default();
-        let range_m = self.model.range_m * fault.range_share;
+        let range_m = self.range_m(view.fault, view.scene);
         let echo = view.mount.echo(point, view.scene.ego.state.speed_mps, range_m)?;
         (!fault.is_dead && !fault.hides(echo.azimuth_rad.to_degrees())).then_some(echo)
     }
@@ -524,6 +532,27 @@ mod tests {
         }
         let mut dead = with(RadarFault { is_dead: true, ..fault });
         assert!(detections(&mut dead, &road, &[], 30).iter().all(Vec::is_empty));
+    }
+
+    #[test]
+    fn rain_shortens_the_range_and_only_the_range() {
+        let road = Road::straight(3);
+        // The car is 45 m away. The range of 50 m falls to 48 m at 10 mm/h, and to 40 m at 200 mm/h.
+        let in_rain = |rain_mm_per_h: f64, range_m: u32| {
+            let text = format!("detection-probability = 1.0\nrange-m = {range_m}");
+            let mut pair = radars(&text, 1);
+            let environment = Environment { rain_mm_per_h, ..Environment::CLEAR_DAY };
+            let others = [car(38.0)];
+            let scene = Scene { environment: &environment, ..scene(&road, &others, Time::ZERO) };
+            pair.sense([&scene, &scene], 0).unwrap();
+            (pair.mounted().returns.map(<[RadarReturn]>::to_vec), pair.health())
+        };
+        let (dry, _) = in_rain(0.0, 50);
+        assert_eq!(dry.each_ref().map(Vec::len), [1, 1]);
+        assert_eq!(in_rain(10.0, 50).0, dry, "the errors stay");
+        let (cloudburst, health) = in_rain(200.0, 50);
+        assert!(cloudburst.iter().all(Vec::is_empty) && health == Health::Ok);
+        assert_eq!(in_rain(200.0, 300).1, Health::Degraded, "more than half of the range is lost");
     }
 
     #[test]
