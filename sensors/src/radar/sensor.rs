@@ -145,8 +145,7 @@ impl RearRadars {
 
     /// Returns the health of the two radars together: failed if both have delivered nothing for a
     /// while. It is degraded if one of them has, if the time stamps have shown for a while that a
-    /// radar is late, or if dirt and rain cost a radar more than half of its
-    /// range.
+    /// radar is late, or if dirt and rain cost a radar more than half of its range.
     pub(crate) fn health(&self) -> Health {
         let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
         let is_noticed = |scans: u32| f64::from(scans) * self.model.period_s() >= noticed_s;

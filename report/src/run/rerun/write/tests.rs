@@ -269,7 +269,7 @@ fn rear_radars_have_points_with_radial_speeds_and_ghosts_are_no_vehicles() {
                 match column.descriptor.component.as_str() {
                     "radial_mps" => {
                         speeds_mps.extend_from_slice(values.as_primitive::<Float64Type>().values());
-                        units.extend(column.descriptor.component_type.map(|unit| unit.to_string()));
+                        units.extend(column.descriptor.component_type.map(|unit| unit.as_str().to_owned()));
                     }
                     "exists" => exists.extend(values.as_boolean().iter().flatten()),
                     _ => {}
