@@ -67,6 +67,8 @@ class Moment(_Readable):
     letter: str | None
     #: Time (s).
     time_s: float
+    #: The vehicle besides the ego: the vehicle ahead if it brakes, else the vehicle behind.
+    vehicle: str | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -15,7 +15,7 @@ use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{ActorId, Time};
 
 use super::Scenario;
-use crate::outcome::{Collision, MisSummary, Moment, Outcome};
+use crate::outcome::{Collision, MisSummary, Moment, Outcome, ReachedMoment};
 
 /// The letters of the vehicles of an encounter: E is the ego, F the lead vehicle, R the rear
 /// vehicle. Any other vehicle has its name.
@@ -38,9 +38,35 @@ impl VehicleLetters {
     pub fn of_vehicle<'a>(&self, ego: &ActorId, vehicle: &'a ActorId) -> &'a str {
         match vehicle {
             _ if vehicle == ego => "E",
+            _ => self.of_other(vehicle),
+        }
+    }
+
+    /// Returns the letter of a vehicle besides the ego, or its name if it has none.
+    fn of_other<'a>(&self, vehicle: &'a ActorId) -> &'a str {
+        match vehicle {
             _ if self.lead.as_ref() == Some(vehicle) => "F",
             _ if self.rear.as_ref() == Some(vehicle) => "R",
             _ => vehicle.as_str(),
+        }
+    }
+
+    /// Returns the letter or the name of the vehicle that reached a moment.
+    fn of_moment<'a>(&self, reached: &'a ReachedMoment) -> &'a str {
+        reached.vehicle.as_ref().map_or(reached.moment.unnamed_vehicle(), |vehicle| self.of_other(vehicle))
+    }
+
+    /// Returns what happens at a moment, with the letter or the name of its vehicle: *R comes near*.
+    pub fn moment_text(&self, reached: &ReachedMoment) -> String {
+        reached.moment.text(self.of_moment(reached))
+    }
+
+    /// Returns the letter of a moment in brackets, if it has one, and what happens: *(b) R comes near*.
+    pub fn moment_label(&self, reached: &ReachedMoment) -> String {
+        let text = self.moment_text(reached);
+        match reached.moment.letter() {
+            Some(letter) => format!("({letter}) {text}"),
+            None => text,
         }
     }
 }
@@ -100,9 +126,10 @@ impl CausalSentence<'_> {
 
     /// Returns how long before the collision the lead vehicle began to brake.
     fn after_braking(&self, collision: &Collision) -> String {
-        match self.outcome.moment(Moment::FrontBrakes) {
-            Some(time) if time <= collision.time => {
-                format!(", {:.1} s after F braked", (collision.time - time).s())
+        match self.outcome.reached(Moment::FrontBrakes) {
+            Some(reached) if reached.time <= collision.time => {
+                let lead = self.letters.of_moment(reached);
+                format!(", {:.1} s after {lead} braked", (collision.time - reached.time).s())
             }
             _ => ", F had not braked".to_owned(),
         }
@@ -123,10 +150,10 @@ impl CausalSentence<'_> {
 
     /// Returns how long before or after the braking the MIS engaged, and how much it could do.
     fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
-        let when = self.outcome.moment(Moment::FrontBrakes).map_or_else(String::new, |time| {
-            let before_s = time.s() - engaged_at_s;
+        let when = self.outcome.reached(Moment::FrontBrakes).map_or_else(String::new, |reached| {
+            let before_s = reached.time.s() - engaged_at_s;
             let side = if before_s >= 0.0 { "before" } else { "after" };
-            format!(", {:.1} s {side} F braked", before_s.abs())
+            format!(", {:.1} s {side} {} braked", before_s.abs(), self.letters.of_moment(reached))
         });
         let gained = match (mis.thw_front_at_engagement_s, mis.thw_front_at_critical_s) {
             (Ok(before_s), Ok(after_s)) => format!(", front headway {before_s:.2} to {after_s:.2} s"),
@@ -161,8 +188,9 @@ impl CausalSentence<'_> {
     /// Returns the part of the sentence about the vehicles.
     pub fn happened(&self) -> String {
         let Some(first) = self.first() else {
-            let braked = self.outcome.moment(Moment::FrontBrakes);
-            let braked = braked.map_or_else(String::new, |time| format!("; F braked at {}", seconds(time)));
+            let braked = self.outcome.reached(Moment::FrontBrakes).map_or_else(String::new, |reached| {
+                format!("; {} braked at {}", self.letters.of_moment(reached), seconds(reached.time))
+            });
             return format!("no vehicle collided{braked}");
         };
         let at = seconds(first.time);
@@ -219,6 +247,10 @@ mod tests {
         }
     }
 
+    fn reached(moment: Moment, time_ms: i64, vehicle: &str) -> ReachedMoment {
+        ReachedMoment { moment, time: Time::from_ms(time_ms), vehicle: Some(id(vehicle)) }
+    }
+
     fn outcome(collisions: Vec<Collision>, reason: Reason) -> Outcome {
         let none = Err(Absent::NoFollower);
         Outcome {
@@ -232,7 +264,7 @@ mod tests {
             duration: Time::from_ms(15_500),
             collisions,
             touches: Vec::new(),
-            moments: vec![ReachedMoment { moment: Moment::FrontBrakes, time: Time::from_ms(9_000) }],
+            moments: vec![reached(Moment::FrontBrakes, 9_000, "front")],
             margins: Margins {
                 min_thw_front_s: none,
                 min_thw_rear_s: none,
@@ -263,6 +295,43 @@ mod tests {
 
     fn sentence(outcome: &Outcome, faults: &[StatedFault], reason_span_s: Option<[f64; 2]>) -> String {
         CausalSentence { outcome, letters: &letters(), faults, reason_span_s }.to_string()
+    }
+
+    #[test]
+    fn a_moment_names_the_vehicle_that_reached_it_and_not_always_r() {
+        let label = |moment, vehicle| letters().moment_label(&reached(moment, 1_000, vehicle));
+        assert_eq!(label(Moment::CriticalDistance, "rear"), "(e) R is at the critical distance");
+        assert_eq!(label(Moment::CriticalDistance, "second"), "(e) second is at the critical distance");
+        assert_eq!(label(Moment::Hazard, "third"), "(a) E brakes hard in front of third");
+        assert_eq!(label(Moment::Concluded, "third"), "third has concluded");
+        assert_eq!(label(Moment::FrontBrakes, "front"), "(d) F brakes");
+        assert_eq!(label(Moment::FrontBrakes, "rear"), "(d) R brakes", "it has overtaken, and is ahead now");
+    }
+
+    #[test]
+    fn a_moment_of_a_journal_without_vehicles_names_neither_r_nor_f() {
+        let unnamed = |moment| ReachedMoment { vehicle: None, ..reached(moment, 1_000, "rear") };
+        assert_eq!(letters().moment_text(&unnamed(Moment::RearNear)), "the vehicle behind comes near");
+        assert_eq!(letters().moment_text(&unnamed(Moment::FrontBrakes)), "the vehicle ahead brakes");
+    }
+
+    #[test]
+    fn outcomes_are_compared_without_the_vehicles_of_moments_if_one_journal_lacks_them() {
+        let named = outcome(Vec::new(), Reason::RearFar);
+        let older = named.without_vehicles_of_moments();
+        assert!(named.has_same_bits(&named.clone()) && named.has_same_bits(&older) && older.has_same_bits(&named));
+        let other = Outcome { moments: vec![reached(Moment::FrontBrakes, 9_000, "rear")], ..named.clone() };
+        assert!(!named.has_same_bits(&other), "another vehicle");
+        let later = Outcome { moments: vec![reached(Moment::FrontBrakes, 9_040, "front")], ..named };
+        assert!(!later.has_same_bits(&older), "another time");
+    }
+
+    #[test]
+    fn the_sentence_names_the_vehicle_ahead_that_braked() {
+        let rear_end = collision(["ego", "rear"], [BoxSide::Rear, BoxSide::Front], ClosedBy::Second);
+        let moments = vec![reached(Moment::FrontBrakes, 9_000, "left-2")];
+        let run = Outcome { moments, ..outcome(vec![rear_end], Reason::PassingLaneOccupied) };
+        assert!(sentence(&run, &[], None).contains(", 4.5 s after left-2 braked; "), "{}", sentence(&run, &[], None));
     }
 
     #[test]

@@ -149,33 +149,43 @@ impl Moment {
         }
     }
 
-    /// Returns a short phrase that says what happens.
-    pub const fn text(self) -> &'static str {
+    /// Returns a short phrase that says what happens. `vehicle` is the letter or the name of the
+    /// vehicle besides the ego: the vehicle behind or, for [`Self::FrontBrakes`], the vehicle ahead.
+    pub fn text(self, vehicle: &str) -> String {
         match self {
-            Self::Hazard => "E brakes hard in front of R",
-            Self::RearNear => "R comes near",
-            Self::CutOut => "R pulls out",
-            Self::FrontBrakes => "F brakes",
-            Self::CriticalDistance => "R is at the critical distance",
-            Self::Crossed => "R has left the lane",
-            Self::Concluded => "R has concluded",
+            Self::Hazard => format!("E brakes hard in front of {vehicle}"),
+            Self::RearNear => format!("{vehicle} comes near"),
+            Self::CutOut => format!("{vehicle} pulls out"),
+            Self::FrontBrakes => format!("{vehicle} brakes"),
+            Self::CriticalDistance => format!("{vehicle} is at the critical distance"),
+            Self::Crossed => format!("{vehicle} has left the lane"),
+            Self::Concluded => format!("{vehicle} has concluded"),
         }
     }
 
-    /// Returns the letter in brackets, if there is one, and the phrase.
-    pub fn label(self) -> String {
-        self.letter().map_or_else(|| self.text().to_owned(), |letter| format!("({letter}) {}", self.text()))
+    /// Returns a word for the vehicle besides the ego if its name is not known.
+    pub(crate) const fn unnamed_vehicle(self) -> &'static str {
+        match self {
+            Self::FrontBrakes => "the vehicle ahead",
+            Self::Hazard | Self::RearNear | Self::CutOut | Self::CriticalDistance | Self::Crossed | Self::Concluded => {
+                "the vehicle behind"
+            }
+        }
     }
 }
 
-/// A moment of the encounter and the time at which it was reached.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// A moment of the encounter, the time at which it was reached, and the vehicle that reached it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReachedMoment {
     /// The moment.
     pub moment: Moment,
     /// Time of the first control step at which the moment's condition held; the cut-out has the
     /// time of a physics step.
     pub time: Time,
+    /// The vehicle besides the ego: the vehicle ahead if it brakes, else the vehicle that is or was
+    /// last behind the ego. `None` in a journal that was written without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vehicle: Option<ActorId>,
 }
 
 /// The reason for the end of a run.
@@ -389,14 +399,37 @@ pub struct Outcome {
 
 impl Outcome {
     /// Returns whether two outcomes are equal to the last bit, including the signs of zeros.
+    ///
+    /// The vehicles of the moments are not compared if one of the outcomes comes from a journal
+    /// without them.
     pub fn has_same_bits(&self, other: &Self) -> bool {
         // serde_json writes floats so that they read back exactly, so equal text means equal bits.
-        matches!((serde_json::to_string(self), serde_json::to_string(other)), (Ok(first), Ok(second)) if first == second)
+        let text = |outcome: &Self| serde_json::to_string(outcome).ok();
+        let is_same = |first: &Self, second: &Self| text(first).is_some_and(|first| text(second) == Some(first));
+        let has_vehicles = |outcome: &Self| outcome.moments.iter().any(|noted| noted.vehicle.is_some());
+        if has_vehicles(self) == has_vehicles(other) {
+            is_same(self, other)
+        } else {
+            is_same(&self.without_vehicles_of_moments(), &other.without_vehicles_of_moments())
+        }
+    }
+
+    /// Returns the outcome without the vehicles of its moments.
+    #[must_use]
+    pub fn without_vehicles_of_moments(&self) -> Self {
+        let mut outcome = self.clone();
+        outcome.moments.iter_mut().for_each(|noted| noted.vehicle = None);
+        outcome
     }
 
     /// Returns the time at which `moment` was reached, or `None` if it was not.
     pub fn moment(&self, moment: Moment) -> Option<Time> {
-        self.moments.iter().find(|noted| noted.moment == moment).map(|noted| noted.time)
+        self.reached(moment).map(|noted| noted.time)
+    }
+
+    /// Returns the time and the vehicle of `moment`, or `None` if it was not reached.
+    pub fn reached(&self, moment: Moment) -> Option<&ReachedMoment> {
+        self.moments.iter().find(|noted| noted.moment == moment)
     }
 
     /// Returns the collisions of the ego, in order of time.

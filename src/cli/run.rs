@@ -6,7 +6,7 @@ use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::json;
 use closecall_report::run::text::OutcomeText;
-use closecall_scenarios::causal::causal_sentence;
+use closecall_scenarios::causal::{VehicleLetters, causal_sentence};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, Setting};
@@ -79,9 +79,10 @@ pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome],
             outln!("{:#}", json::stamped(serde_json::Value::Array(both), None, settings));
         }
         (Format::Human, outcomes) => {
+            let letters = VehicleLetters::of(scenario);
             for (outcome, arm) in outcomes.iter().zip(arms) {
                 let sentence = causal_sentence(scenario, arm.sensors, outcome);
-                print_text(OutcomeText { outcome, sentence: &sentence });
+                print_text(OutcomeText { outcome, sentence: &sentence, letters: &letters });
             }
         }
     }

@@ -3,13 +3,13 @@
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
-use closecall_scenarios::outcome::Outcome;
+use closecall_scenarios::outcome::{Moment, Outcome, ReachedMoment};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile, Setting};
-use closecall_sensors::SensorMode;
+use closecall_sensors::{SceneVehicle, SensorMode};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, NoObserver, Observer, RunEvent, RunKey, StepView, simulate};
-use closecall_traffic::{CONTROL_STEP, ParameterName, Time, Value};
+use closecall_traffic::{ActorId, CONTROL_STEP, ParameterName, Time, Value};
 
 use crate::support::{all_of_library, library};
 
@@ -221,4 +221,52 @@ fn a_driver_who_pulls_out_behind_another_one_does_not_strike_the_vehicle_that_bo
         let key = RunKey { seed: 7, sample: index };
         assert!(!collides_without_the_system("rear-vehicles-one-after-another-without-brake", key), "sample {index}");
     }
+}
+
+/// Notes the gap along the road from each vehicle to the ego (m) at each control step. A vehicle whose front has passed the ego's
+/// rear end has a negative gap.
+#[derive(Default)]
+struct GapsBehind(Vec<(Time, Vec<(ActorId, f64)>)>);
+
+impl Observer for GapsBehind {
+    fn step(&mut self, view: &StepView<'_>) {
+        let ego = view.vehicles[view.scenario.ego];
+        let gap_m = |other: &SceneVehicle| {
+            let lengths_m = ego.vehicle.dimensions.length_m + other.vehicle.dimensions.length_m;
+            ego.state.s_m - other.state.s_m - 0.5 * lengths_m
+        };
+        let gaps = view.vehicles.iter().map(|other| (view.scenario.actors[other.actor].id.clone(), gap_m(other)));
+        self.0.push((view.time, gaps.collect()));
+    }
+
+    fn event(&mut self, _: Time, _: &RunEvent) {}
+}
+
+#[test]
+fn a_moment_with_several_vehicles_behind_has_the_one_that_is_there() {
+    let name = "rear-vehicles-one-after-another";
+    let mut names = Vec::new();
+    for index in 0..12 {
+        let key = RunKey { seed: 2, sample: index };
+        for controller in [BuiltIn::Acc, BuiltIn::Mis] {
+            let mut gaps = GapsBehind::default();
+            let outcome = run(&sample(name, &[], key), key, controller, &mut gaps);
+            let gap_m = |reached: &ReachedMoment| {
+                let vehicle = reached.vehicle.clone().unwrap();
+                let (_, step) = gaps.0.iter().find(|(time, _)| *time == reached.time).unwrap();
+                step.iter().find(|(id, _)| *id == vehicle).unwrap().1
+            };
+            if let Some(reached) = outcome.reached(Moment::CriticalDistance) {
+                assert!((-5.0..=5.01).contains(&gap_m(reached)), "sample {index}: {reached:?} {} m", gap_m(reached));
+                names.push(reached.vehicle.clone().unwrap());
+            }
+            if let Some(reached) = outcome.reached(Moment::Hazard) {
+                assert!((-0.01..=100.01).contains(&gap_m(reached)), "sample {index}: {reached:?} {} m", gap_m(reached));
+            }
+            if let Some(reached) = outcome.reached(Moment::FrontBrakes) {
+                assert!(gap_m(reached) < 0.0, "sample {index}: {reached:?} {} m", gap_m(reached));
+            }
+        }
+    }
+    assert!(names.iter().any(|name| name.as_str() != "rear"), "no sample distinguishes the vehicles: {names:?}");
 }

@@ -75,7 +75,7 @@ fn collision(collision: &Collision) -> Value {
 }
 
 fn moment(at: &ReachedMoment) -> Value {
-    json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s() })
+    json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s(), "vehicle": at.vehicle })
 }
 
 fn margins(outcome: &Outcome) -> Value {

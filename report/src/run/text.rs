@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use closecall_scenarios::outcome::{Collision, MisSummary, Outcome, ReasonSpan};
+use closecall_scenarios::causal::VehicleLetters;
+use closecall_scenarios::outcome::{Collision, MisSummary, Moment, Outcome, ReasonSpan};
 use closecall_traffic::Measured;
 
 /// Returns a touch in words.
@@ -49,11 +50,13 @@ pub struct OutcomeText<'a> {
     pub outcome: &'a Outcome,
     /// The event and its cause, in one sentence.
     pub sentence: &'a str,
+    /// The letters of its vehicles.
+    pub letters: &'a VehicleLetters,
 }
 
 impl fmt::Display for OutcomeText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { outcome, sentence } = self;
+        let Self { outcome, sentence, letters } = self;
         writeln!(
             f,
             "{} · {} · seed {} · sample {} · ended at {} ({})",
@@ -69,7 +72,7 @@ impl fmt::Display for OutcomeText<'_> {
             writeln!(f, "  {name} = {value}")?;
         }
         for at in &outcome.moments {
-            writeln!(f, "  {} at {:.2} s", at.moment.label(), at.time.s())?;
+            writeln!(f, "  {} at {:.2} s", letters.moment_label(at), at.time.s())?;
         }
         for collision in &outcome.collisions {
             let [first, second] = &collision.between;
@@ -99,7 +102,11 @@ impl fmt::Display for OutcomeText<'_> {
             Ok(mis) => {
                 f.write_str(&line("MIS engaged at", mis.engaged_at_s, "s"))?;
                 f.write_str(&line("  front time headway then", mis.thw_front_at_engagement_s, "s"))?;
-                f.write_str(&line("  front time headway at the critical moment", mis.thw_front_at_critical_s, "s"))?;
+                let when = outcome.reached(Moment::CriticalDistance).map_or_else(
+                    || "at the critical distance".to_owned(),
+                    |reached| format!("when {}", letters.moment_text(reached)),
+                );
+                f.write_str(&line(&format!("  front time headway {when}"), mis.thw_front_at_critical_s, "s"))?;
                 writeln!(f, "  MIS: {}", reason_text(mis))
             }
             Err(_) => Ok(()),

@@ -8,10 +8,11 @@
 //!
 //! E is the ego, F the lead vehicle, R the rear vehicle, and d_c the critical distance. The moments
 //! follow from the ground truth, not from the controller, so that runs with and without the system
-//! can be compared. Each is noted once. They may occur in another order: the lead vehicle may brake
+//! can be compared. Each is noted once, with its vehicle: if several vehicles come from behind, their
+//! moments may belong to different ones. They may occur in another order: the lead vehicle may brake
 //! early.
 
-use closecall_traffic::Time;
+use closecall_traffic::{ActorId, Time};
 
 use closecall_scenarios::outcome::{Moment, ReachedMoment};
 
@@ -28,10 +29,10 @@ impl Default for Moments {
 }
 
 impl Moments {
-    /// Notes that `moment` is reached at `time`, unless it was reached before.
-    pub(super) fn note(&mut self, moment: Moment, time: Time) {
+    /// Notes that `vehicle` reaches `moment` at `time`, unless it was reached before.
+    pub(super) fn note(&mut self, moment: Moment, time: Time, vehicle: Option<&ActorId>) {
         if !self.noted.iter().any(|noted| noted.moment == moment) {
-            self.noted.push(ReachedMoment { moment, time });
+            self.noted.push(ReachedMoment { moment, time, vehicle: vehicle.cloned() });
         }
     }
 
@@ -49,11 +50,14 @@ mod tests {
     #[test]
     fn each_moment_is_noted_once_and_they_come_in_order_of_time() {
         let mut moments = Moments::default();
-        moments.note(Moment::FrontBrakes, Time::from_ms(40));
-        moments.note(Moment::RearNear, Time::from_ms(40));
-        moments.note(Moment::RearNear, Time::from_ms(80));
-        let noted: Vec<_> =
-            moments.finish().iter().map(|noted| (noted.moment.letter().unwrap(), noted.time.ns())).collect();
-        assert_eq!(noted, [('b', 40_000_000), ('d', 40_000_000)]);
+        let [first, second] = ["first", "second"].map(|name| ActorId::new(name).unwrap());
+        moments.note(Moment::FrontBrakes, Time::from_ms(40), None);
+        moments.note(Moment::RearNear, Time::from_ms(40), Some(&first));
+        moments.note(Moment::RearNear, Time::from_ms(80), Some(&second));
+        let noted = moments.finish();
+        let letters_and_times: Vec<_> =
+            noted.iter().map(|noted| (noted.moment.letter().unwrap(), noted.time.ns())).collect();
+        assert_eq!(letters_and_times, [('b', 40_000_000), ('d', 40_000_000)]);
+        assert_eq!(noted[0].vehicle, Some(first), "the vehicle that came near first");
     }
 }

@@ -38,6 +38,12 @@ impl Encounter {
         self.phase
     }
 
+    /// Returns the index of the rear vehicle in the list of actors. `None` if no vehicle was behind
+    /// the ego.
+    pub(crate) fn rear(&self) -> Option<usize> {
+        self.rear
+    }
+
     /// Updates the phase by one step and returns it. `follower` is the vehicle behind the ego in
     /// the ego's lane.
     pub(crate) fn update(&mut self, world: &World, ego: usize, follower: Option<Follower>) -> Phase {

@@ -353,16 +353,18 @@ impl<'a> Run<'a> {
     /// Notes the moments of the encounter that are reached now.
     fn note_moments(&mut self, rear: RearObservation) {
         let time = self.world.time();
-        for (moment, is_now) in [
-            (Moment::Hazard, rear.is_hazard),
-            (Moment::RearNear, rear.near.is_some()),
-            (Moment::CriticalDistance, rear.is_critical),
-            (Moment::FrontBrakes, self.lead_brakes()),
-            (Moment::Crossed, rear.has_crossed),
-            (Moment::Concluded, self.encounter.phase() == Phase::After),
+        let lead = self.margins.lead.ok().map(|lead| lead.actor);
+        let last_behind = self.encounter.rear();
+        for (moment, is_now, actor) in [
+            (Moment::Hazard, rear.is_hazard, rear.near),
+            (Moment::RearNear, rear.near.is_some(), rear.near),
+            (Moment::CriticalDistance, rear.is_critical, last_behind),
+            (Moment::FrontBrakes, self.lead_brakes(), lead),
+            (Moment::Crossed, rear.has_crossed, last_behind),
+            (Moment::Concluded, self.encounter.phase() == Phase::After, last_behind),
         ] {
             if is_now {
-                self.moments.note(moment, time);
+                self.moments.note(moment, time, actor.map(|actor| &self.scenario.actors[actor].id));
             }
         }
     }

@@ -126,8 +126,14 @@ pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> R
             let arm = Arm { controller: controller.factory(), sensors: Some(sensors) };
             // `serde_json` writes numbers so that they read back to the bit.
             let text = match run_guarded(&scenario, RunKey { seed, sample }, &arm, &mut NoObserver) {
-                // Cost, promise and what the ego meets ahead follow from the same motion, and have tests of their own.
-                Ok(outcome) => serde_json::to_string(&Outcome { cost: None, promise: None, ahead: None, ..outcome })?,
+                // Cost, promise, what the ego meets ahead and the vehicles of the moments follow from the same motion, and
+                // have tests of their own.
+                Ok(outcome) => serde_json::to_string(&Outcome {
+                    cost: None,
+                    promise: None,
+                    ahead: None,
+                    ..outcome.without_vehicles_of_moments()
+                })?,
                 Err(error) => error.to_string(),
             };
             hasher.update(&(text.len() as u64).to_le_bytes());

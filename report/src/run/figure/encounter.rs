@@ -110,8 +110,9 @@ type Instant = (Time, char, String);
 fn worst_instants(baseline: &Film) -> Vec<Instant> {
     let arm = baseline.arm_label();
     let hazard = baseline.moments().iter().find(|noted| noted.moment == Moment::Hazard);
-    let hazard =
-        hazard.and_then(|noted| Some((noted.time, noted.moment.letter()?, format!("{} ({arm})", noted.moment.text()))));
+    let hazard = hazard.and_then(|noted| {
+        Some((noted.time, noted.moment.letter()?, format!("{} ({arm})", baseline.letters.moment_text(noted))))
+    });
     let collision = baseline.worst_collision().map(|collision| (collision.time, '!', format!("collision ({arm})")));
     hazard.into_iter().chain(collision).collect()
 }
@@ -122,7 +123,7 @@ fn worst_instants(baseline: &Film) -> Vec<Instant> {
 fn instants(film: &Film) -> Vec<Instant> {
     let moments = film.moments().iter();
     let mut instants: Vec<_> = moments
-        .filter_map(|noted| Some((noted.time, noted.moment.letter()?, noted.moment.text().to_owned())))
+        .filter_map(|noted| Some((noted.time, noted.moment.letter()?, film.letters.moment_text(noted))))
         .collect();
     if let Some(collision) = film.worst_collision() {
         instants.push((collision.time, '!', "collision".to_owned()));

@@ -43,7 +43,7 @@ pub(crate) fn timeline(films: &[Film]) -> Markup {
                         (axis.band((from_s, until_s, REASONS_PX), &reason, [if index % 2 == 0 { REASON } else { OTHER_REASON }, "#222222"]))
                     }
                     @for noted in film.moments() {
-                        (axis.mark(noted.time, ("#55606d", 1), noted.moment.letter().map_or("·".to_owned(), String::from), &noted.moment.label()))
+                        (axis.mark(noted.time, ("#55606d", 1), noted.moment.letter().map_or("·".to_owned(), String::from), &film.letters.moment_label(noted)))
                     }
                     @for collision in film.collisions() {
                         (axis.mark(collision.time, (COLLISION, 2), "!".to_owned(), "collision"))
@@ -53,7 +53,7 @@ pub(crate) fn timeline(films: &[Film]) -> Markup {
                     (film.arm_label()) ", " (format!("{:.1} to {:.1} s", axis.start_s, axis.start_s + axis.span_s))
                     ": states of the ego stack, reasons of the MIS, moments"
                     @for noted in film.moments() {
-                        @if let Some(letter) = noted.moment.letter() { " · (" (letter) ") " (format!("{:.1} s ", noted.time.s())) (noted.moment.text()) }
+                        @if let Some(letter) = noted.moment.letter() { " · (" (letter) ") " (format!("{:.1} s ", noted.time.s())) (film.letters.moment_text(noted)) }
                     }
                 }
             }

@@ -70,7 +70,7 @@ impl Film {
         let happenings = self.happenings.iter().filter_map(|(time, event)| self.line(*time, event));
         let moments = self.moments().iter().map(|noted| StoryLine {
             time: noted.time,
-            text: noted.moment.label(),
+            text: self.letters.moment_label(noted),
             is_severe: false,
         });
         let notes =

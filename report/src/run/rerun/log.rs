@@ -29,7 +29,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
     let mut lines = vec![plain("log/run", start, film.title.clone())];
     lines.extend(film.happenings.iter().map(|(time, event)| line(film, *time, event)));
     lines.extend(film.moments().iter().map(|noted| {
-        let text = noted.moment.label();
+        let text = film.letters.moment_label(noted);
         plain("log/moment", noted.time, text)
     }));
     lines.extend(sight_lines(film));

@@ -259,7 +259,7 @@ impl Plots<'_> {
         for (number, noted) in moments.iter().enumerate() {
             let entity = format!("plots/{}/moments/{}", plot.kind.name(), number + 1);
             let style = SeriesLines::new()
-                .with_names([noted.moment.label()])
+                .with_names([self.film.letters.moment_label(noted)])
                 .with_colors([palette::moment(noted.moment)])
                 .with_widths([THIN_LINE_WIDTH]);
             self.writer.write_static(&entity, &style)?;

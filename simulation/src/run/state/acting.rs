@@ -42,7 +42,7 @@ impl Run<'_> {
                 if note == DriverNote::CutOutStarted {
                     self.events.note_cut_out(actor, time);
                     if !self.world.is_wrecked(ego) && self.margins.follower == Some(actor) {
-                        self.moments.note(Moment::CutOut, time);
+                        self.moments.note(Moment::CutOut, time, Some(&self.scenario.actors[actor].id));
                     }
                 }
                 observer.event(time, &RunEvent::DriverNote { actor, note });

@@ -251,7 +251,7 @@ impl Plots<'_> {
         if moments.is_empty() {
             return Ok(());
         }
-        let texts: Vec<String> = moments.iter().map(|noted| noted.moment.label()).collect();
+        let texts: Vec<String> = moments.iter().map(|noted| self.film.letters.moment_label(noted)).collect();
         let short =
             |noted: &ReachedMoment| noted.moment.letter().map_or("·".to_owned(), |letter| format!("({letter})"));
         let short: Vec<String> = moments.iter().map(short).collect();
