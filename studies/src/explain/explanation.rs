@@ -97,6 +97,14 @@ pub struct MisEffect {
     pub mean_deceleration_mps2: Option<f64>,
 }
 
+impl MisEffect {
+    /// Returns whether the controller reports states of the system: it engaged, or switching its
+    /// states off has an effect. An external controller may report none.
+    pub(super) fn reports_states(&self) -> bool {
+        self.engaged_at_s.is_some() || self.runs.iter().any(|run| run.prevents)
+    }
+}
+
 /// The explanation of a failure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Explanation {

@@ -6,7 +6,7 @@ use std::path::Path;
 use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
 use closecall_scenarios::MisState;
 
-use super::{Cause, Explanation, MisEffect, StageRun};
+use super::{Cause, Explanation, MisEffect, Stage, StageRun};
 
 /// An explanation as text for readers.
 #[derive(Clone, Copy, Debug)]
@@ -23,14 +23,7 @@ impl Explanation {
     /// Returns the cause in one sentence.
     pub fn sentence(&self) -> String {
         let due = match &self.cause {
-            Cause::Stage { stage } => {
-                let unusual = self.confirmation().and_then(|run| run.unusual.as_ref());
-                let unusual = unusual.map_or_else(String::new, |how| format!(" ({how})"));
-                let narrowly = self.confirmation().and_then(narrowly).unwrap_or_default();
-                let is_usual = self.confirmation().is_some_and(|run| run.is_usual);
-                let with = if is_usual { "it as usual, though not with it perfect" } else { stage.replacement() };
-                format!("It is due to {}{unusual}: with {with}, no vehicle collides{narrowly}.", stage.name())
-            }
+            Cause::Stage { stage } => due_to(*stage, self.confirmation()),
             Cause::Pair { stages: [first, second] } => format!(
                 "No stage alone is to blame. With {} and {} together, no vehicle collides.",
                 first.replacement(),
@@ -43,6 +36,18 @@ impl Explanation {
             None => due,
         }
     }
+}
+
+/// Returns the sentence about a stage that is the cause, with the run that confirms it.
+fn due_to(stage: Stage, confirmation: Option<&StageRun>) -> String {
+    let unusual = confirmation.and_then(|run| run.unusual.as_ref());
+    let unusual = unusual.map_or_else(String::new, |how| format!(" ({how})"));
+    let narrowly = confirmation.and_then(narrowly).unwrap_or_default();
+    let is_usual = confirmation.is_some_and(|run| run.is_usual);
+    let with = if is_usual { "it as usual, though not with it perfect" } else { stage.replacement() };
+    // A run that nearly collides shows less: a small change of anything may have the same effect.
+    let is_due = if narrowly.is_empty() { "It is due to" } else { "It may be due to" };
+    format!("{is_due} {}{unusual}: with {with}, no vehicle collides{narrowly}.", stage.name())
 }
 
 /// Gap below which a run counts as having passed narrowly (m): an assumption, a quarter of a car's
@@ -69,7 +74,14 @@ fn induced_words(mis: &MisEffect) -> String {
         Some(MisState::Releasing) => {
             "it returned the margin; if the cruise control drives instead, no vehicle collides".to_owned()
         }
-        None => "no state of the system alone is to blame, but all of them together".to_owned(),
+        None if mis.runs.iter().any(|run| run.prevents) => {
+            "no state of the system alone is to blame, but all of them together".to_owned()
+        }
+        None if mis.engaged_at_s.is_none() => {
+            "which of its states is to blame is not known, because it reports none (increasing, holding or releasing)"
+                .to_owned()
+        }
+        None => "neither a state that it reports is to blame, nor all of them together".to_owned(),
     };
     format!("The system induces it (without the system, no vehicle collides): {cause}.")
 }
@@ -102,7 +114,9 @@ impl fmt::Display for ExplanationText<'_> {
         for run in explanation.pairs.iter().filter(|run| run.prevents) {
             writeln!(f, "  {} + {}: {}", run.stages[0].name(), run.stages[1].name(), outcome_words(run))?;
         }
-        for run in explanation.mis.iter().flat_map(|mis| &mis.runs) {
+        // Without a reported state, switching states off changes nothing.
+        let with_states = explanation.mis.iter().filter(|mis| mis.reports_states());
+        for run in with_states.flat_map(|mis| &mis.runs) {
             let off: Vec<&str> = run.off.iter().map(|state| state.name()).collect();
             let result = if run.prevents { "no collision" } else { "still collides" };
             writeln!(f, "  without the system while {}: {result}", off.join(", "))?;
@@ -131,5 +145,63 @@ fn outcome_words(run: &StageRun) -> String {
             1 => "still collides".to_owned(),
             count => format!("still collides ({count} collisions)"),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::MisRun;
+
+    /// The effect of a system that engaged or not; switching off all of its states prevents the failure or not.
+    fn effect(engaged_at_s: Option<f64>, all_prevent: bool) -> MisEffect {
+        let run = |off: &[MisState], prevents| MisRun { off: off.to_vec(), setting: String::new(), prevents };
+        let mut runs: Vec<MisRun> = MisState::ALL.iter().map(|state| run(&[*state], false)).collect();
+        runs.push(run(&MisState::ALL, all_prevent));
+        MisEffect {
+            is_induced: true,
+            runs,
+            state: None,
+            engaged_at_s,
+            released_at_s: None,
+            mean_deceleration_mps2: None,
+        }
+    }
+
+    #[test]
+    fn all_states_together_are_to_blame_only_if_switching_them_off_prevents_the_failure() {
+        let together = "all of them together.";
+        let prevented = induced_words(&effect(Some(4.0), true));
+        assert!(
+            prevented.contains("no state of the system alone is to blame, but all of them together"),
+            "{prevented}"
+        );
+        let reported = induced_words(&effect(Some(4.0), false));
+        assert!(reported.contains("neither a state that it reports is to blame") && reported.ends_with(together));
+        let silent = effect(None, false);
+        let words = induced_words(&silent);
+        assert!(words.contains("it reports none") && !words.contains("together"), "{words}");
+        assert!(!silent.reports_states() && effect(Some(4.0), false).reports_states());
+        assert!(effect(None, true).reports_states(), "it reports another state than increasing");
+    }
+
+    #[test]
+    fn a_stage_that_prevents_a_failure_narrowly_is_not_said_to_be_its_cause() {
+        let run = |gap_m| StageRun {
+            stages: vec![Stage::Points],
+            is_usual: false,
+            settings: Vec::new(),
+            unusual: None,
+            prevents: true,
+            collisions: Some(0),
+            min_gap_rear_m: Some(gap_m),
+            min_gap_front_m: None,
+            error: None,
+        };
+        let sentence = |gap_m| due_to(Stage::Points, Some(&run(gap_m)));
+        let narrow = "It may be due to points: with exact points of the rear LiDAR, no vehicle collides, but narrowly: \
+                      the least gap is 0.0 m.";
+        assert_eq!(sentence(0.0), narrow);
+        assert_eq!(sentence(3.0), "It is due to points: with exact points of the rear LiDAR, no vehicle collides.");
     }
 }
