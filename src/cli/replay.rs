@@ -82,12 +82,21 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     }
     let (there, here) = (&saved.manifest().closecall_version, version());
     let cause = match &changes[..] {
-        [] if *there == here => "the program and the files of the controllers have not changed".to_owned(),
+        [] if *there == here => unchanged(saved.manifest()).to_owned(),
         [] => format!("closecall {there} ran the campaign, this is {here}"),
         changes => changes.join("; "),
     };
     print_error(format_args!("the replay differs from the campaign's journal: {cause}\n"));
     Ok(ExitCode::Invalid)
+}
+
+/// Returns what has not changed since the campaign, in words. A file that only a controller knows may have changed.
+fn unchanged(manifest: &Manifest) -> &'static str {
+    if manifest.foreign_code().is_empty() {
+        return "the program has not changed";
+    }
+    "the program has not changed, nor have the files that the commands name; files that a controller imports are not \
+     checked"
 }
 
 /// Prints the command of an external controller before it starts. The folder may have another

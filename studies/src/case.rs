@@ -44,7 +44,7 @@ pub enum CausesError {
     /// The sample fails in the journal of the campaign, but not when it is run again.
     #[error(
         "sample {sample} with `{controller}` collides in the journal of the campaign, but not if it is run again: the \
-         controller or the program has changed, or does not repeat"
+         controller, a file that it imports or the program has changed, or does not repeat"
     )]
     NotRepeated {
         /// The sample's number.

@@ -56,3 +56,24 @@ fn a_replay_runs_the_controller_in_the_folder_of_the_campaign() {
     let replayed = program().current_dir(folder.path().join("out")).args(["replay", ".", "1"]).output().unwrap();
     stdout(&replayed, 0);
 }
+
+#[test]
+fn a_replay_does_not_say_that_nothing_has_changed_if_a_file_that_the_controller_imports_has() {
+    let folder = folder();
+    let imported = folder.path().join("pace.sh");
+    let script = STEADY.replace("read -r line\nwhile", ". ./pace.sh\nread -r line\nwhile");
+    let script = script.replace("'{\"acceleration_mps2\":0.0,", "'{\"acceleration_mps2\":'$pace',");
+    assert!(script.contains("$pace") && script.contains("pace.sh"), "{script}");
+    fs::write(folder.path().join("steady.sh"), script).unwrap();
+    fs::write(&imported, "pace=0.0\n").unwrap();
+    campaign(folder.path(), &[]);
+    let replay = || closecall(["replay", folder.path().join("out").to_str().unwrap(), "0"]);
+    stdout(&replay(), 0);
+
+    fs::write(&imported, "pace=-2.0\n").unwrap();
+    let replayed = replay();
+    assert_eq!(code(&replayed), 7, "{}", stderr(&replayed));
+    let told = message(&replayed);
+    assert!(told.contains("nor have the files that the commands name"), "{told}");
+    assert!(told.contains("files that a controller imports are not checked"), "{told}");
+}
