@@ -1,6 +1,7 @@
 //! `closecall view DIR`: the explorer in a real browser, as a page that is served and as a file,
 //! and attacks on its server.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -8,6 +9,9 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 
+use closecall_campaign::folder::Folder;
+use closecall_campaign::record::Record;
+use closecall_scenarios::harm::harm;
 use closecall_testing::browser;
 use serde_json::json;
 use tempfile::TempDir;
@@ -180,6 +184,34 @@ fn the_file_needs_no_server_and_links_to_the_recorded_samples() {
     assert!(!shown.as_str().unwrap().contains("Open in Rerun"), "a file runs nothing");
     assert_eq!(requests_but(&mut page, "file:"), Vec::<String>::new());
     assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn the_list_is_in_the_order_of_harm_and_says_how_many_samples_it_leaves_out() {
+    let folder = folder();
+    let out = campaign(&folder, "300");
+    let file = out.join("explorer.html");
+    stdout(&program().args(["view", "--export"]).arg(&file).arg(&out).output().unwrap(), 0);
+    let Some(mut page) = open(&folder, &format!("file://{}", file.display())) else { return };
+    let records = Folder::open(&out).records().unwrap().map(Result::unwrap);
+    let harm_of = |record: &Record| harm(record.arms.last().unwrap().result.as_ref().unwrap());
+    let harms: BTreeMap<u64, f64> = records.map(|record| (record.sample, harm_of(&record))).collect();
+    let listed = page.evaluate(
+        "[...document.querySelectorAll('#list tbody tr')].map(row => [Number(row.querySelector('button').innerText), \
+         row.children[1].innerText])",
+    );
+    let listed: Vec<(u64, String)> = serde_json::from_value(listed).unwrap();
+    assert_eq!(listed.len(), 25);
+    for pair in listed.windows(2).filter(|pair| pair[0].1 == pair[1].1) {
+        let [first, second] = [0, 1].map(|index| harms[&pair[index].0]);
+        // The page has four digits.
+        assert!(first >= 0.999 * second, "{pair:?}: {first} before {second}");
+    }
+    let harmful: Vec<u64> = harms.iter().filter(|(_, harm)| **harm > 0.0).map(|(sample, _)| *sample).collect();
+    assert!((3..=25).contains(&harmful.len()), "{harmful:?}");
+    assert!(harmful.iter().all(|sample| listed.iter().any(|(number, _)| number == sample)), "{harmful:?} {listed:?}");
+    let note = page.evaluate("document.querySelector('#list p').innerText");
+    assert!(note.as_str().unwrap().starts_with("25 of 300 chosen samples: by outcome, then by harm"), "{note}");
 }
 
 #[test]

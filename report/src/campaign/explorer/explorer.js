@@ -147,7 +147,8 @@ const drawPlane = panel => {
 };
 
 // The rows in the order of gravity: by the outcome, then by each of these columns; 1 if a small value is grave, -1 if a large one is.
-const GRAVITY = [['impact_speed_mps', -1], ['collision_relative_speed_mps', -1], ['touch_relative_speed_mps', -1], ['min_ttc_rear_s', 1], ['min_thw_rear_s', 1]];
+// The harm is the order of the report and of the recordings.
+const GRAVITY = [['harm', -1], ['collision_relative_speed_mps', -1], ['touch_relative_speed_mps', -1], ['min_ttc_rear_s', 1], ['min_thw_rear_s', 1]];
 const gravest = () => {
   const by = samples.gravest ??= {};
   if (by[arm]) return by[arm];
@@ -163,9 +164,9 @@ const gravest = () => {
   });
 };
 const list = () => {
-  shown = [];
-  for (const row of gravest()) { if (shown.length === LISTED) break; if (samples.mask[row]) shown.push(row); }
-  const listed = ['mis_reason', 'cause', 'collision_relative_speed_mps', 'touch_relative_speed_mps', 'min_ttc_rear_s', 'min_thw_rear_s'].map(column).filter(Boolean);
+  const chosen = gravest().filter(row => samples.mask[row]);
+  shown = Array.from(chosen.subarray(0, LISTED));
+  const listed = ['mis_reason', 'cause', 'harm', 'collision_relative_speed_mps', 'touch_relative_speed_mps', 'min_ttc_rear_s', 'min_thw_rear_s'].map(column).filter(Boolean);
   const head = made('tr', {}, ...['sample', 'outcome', ...listed.map(one => one.label), 'recording'].map(name => made('th', {}, name)));
   const rows = shown.map(row => {
     const number = samples.numbers[row], recording = data.recordings[samples.index][number];
@@ -177,7 +178,8 @@ const list = () => {
       return td;
     }));
   });
-  byId('list').replaceChildren(made('div', { className: 'wide', tabIndex: 0 }, made('table', {}, made('thead', {}, head), made('tbody', {}, ...rows))));
+  const counted = `${shown.length} of ${chosen.length.toLocaleString('en')} chosen samples: by outcome, then by harm, then by speeds and margins`;
+  byId('list').replaceChildren(made('p', { className: 'note' }, counted), made('div', { className: 'wide', tabIndex: 0 }, made('table', {}, made('thead', {}, head), made('tbody', {}, ...rows))));
 };
 
 // Draws all charts but `except`, in which the pointer draws a brush.
