@@ -236,7 +236,7 @@ fn a_verdict_names_what_its_scenario_extrapolates() {
         stdout(&closecall(["campaign", path.to_str().unwrap(), "-n", "3", "--sensors", "ground-truth", "--no-gate"]), 0)
     };
     let headline = text("low-thw-overtake");
-    assert!(headline.contains("extrapolates beyond recorded traffic: closing-mps 2.800 to 13.900, observed 0.001 to 4.15 (13 observations), 87.8 % of the samples beyond"), "{headline}");
+    assert!(headline.contains("extrapolates beyond recorded traffic: closing-mps 2.800 to 13.900, observed 0.001 to 4.15 (13 observations), 87.8 % of the distribution beyond"), "{headline}");
     assert!(!text("as-recorded/low-thw-overtake-as-recorded").contains("extrapolates"));
 }
 

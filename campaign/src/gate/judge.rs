@@ -262,7 +262,7 @@ fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String>
     let [low, high] = entry.distribution.bounds()?;
     let range = if entry.distribution.is_fixed() { format!("{low}") } else { format!("{low:.3} to {high:.3}") };
     Some(format!(
-        "{name} {range}, observed {} to {} ({} observations), {} of the samples beyond",
+        "{name} {range}, observed {} to {} ({} observations), {} of the distribution beyond",
         observed.min,
         observed.max,
         observed.n,

@@ -70,7 +70,7 @@ pub struct ParameterConfig {
     /// Provenance: the distribution was assumed, for the reason given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed: Option<String>,
-    /// What trajectory data show of the quantity. A verdict says which share of the samples lies
+    /// What trajectory data show of the quantity. A verdict says which share of the distribution lies
     /// beyond it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observed: Option<ObservedConfig>,
