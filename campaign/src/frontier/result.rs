@@ -7,6 +7,10 @@ use super::plan::FrontierPlan;
 use crate::ledger::{Pairs, Tally};
 use crate::sensitivity::RunErrors;
 
+/// Difference of the speed lost below which two combinations count as equal (m/s): the last digit of
+/// the reports.
+const SPEED_LOST_STEP_MPS: f64 = 0.01;
+
 /// The result of all combinations.
 #[derive(Clone, Debug)]
 pub struct Frontier {
@@ -50,7 +54,8 @@ pub struct Point {
     /// the baseline (m/s); `None` for fewer than two samples.
     pub speed_lost_mps: Option<Estimate>,
     /// True if the combination is Pareto-optimal: no other combination is better in one of
-    /// prevented, induced and speed lost, and at least as good in the other two.
+    /// prevented, induced and speed lost, and at least as good in the other two. The speed lost counts
+    /// in steps of 0.01 m/s, as it is reported.
     pub is_optimal: bool,
 }
 
@@ -83,10 +88,17 @@ impl Point {
     }
 
     /// Returns the three costs of a point: remaining collisions, induced collisions, and speed
-    /// lost.
+    /// lost in whole steps.
     fn costs(&self) -> Option<[f64; 3]> {
         let value = |estimate: Option<Estimate>| Some(estimate?.value);
-        Some([-value(self.prevented)?, value(self.induced)?, value(self.speed_lost_mps)?])
+        let lost_steps = (value(self.speed_lost_mps)? / SPEED_LOST_STEP_MPS).round();
+        Some([-value(self.prevented)?, value(self.induced)?, lost_steps])
+    }
+
+    /// Returns the number of samples that are induced or collide in both arms, although only vehicles
+    /// other than the ego collide in the arm under test. They are no collisions of the ego.
+    pub fn of_others(&self) -> u64 {
+        self.pairs.induced_of_others + self.pairs.both_of_others
     }
 }
 
@@ -155,5 +167,24 @@ mod tests {
         ];
         mark_optimal(&mut points);
         assert_eq!(points.map(|point| point.is_optimal), [true, false, true, false, false]);
+    }
+
+    #[test]
+    fn combinations_whose_figures_print_alike_are_marked_alike() {
+        let baseline = tallies(&[Some(true), Some(true), Some(false)], 0.0);
+        let point = |lost_mps| Point::new(Vec::new(), &baseline, &tallies(&[true, false, false].map(Some), lost_mps));
+        let mut points = [point(1.000_03), point(1.0), point(1.02)];
+        mark_optimal(&mut points);
+        assert_eq!(points.map(|point| point.is_optimal), [true, true, false]);
+    }
+
+    #[test]
+    fn a_point_counts_the_samples_in_which_only_other_vehicles_collide() {
+        let baseline = tallies(&[Some(true), Some(false)], 0.0);
+        let mut tested = tallies(&[Some(false), Some(false)], 0.0);
+        tested[0].others_collided = true;
+        let point = Point::new(Vec::new(), &baseline, &tested);
+        assert_eq!((point.collisions_without, point.collisions, point.pairs.prevented), (1, 0, 0));
+        assert_eq!(point.of_others(), 1);
     }
 }

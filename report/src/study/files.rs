@@ -21,7 +21,7 @@ use super::boundary::{
     BoundaryText, about, cells as boundary_cells, charts as boundary_charts, heads as boundary_heads, ranges,
     statements, verdict,
 };
-use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, short};
+use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, others, short};
 use super::sensitivity::{SensitivityText, conclusion};
 use super::tornado::charts as tornado_charts;
 use crate::campaign::html::page::{document, number, table, text_heads};
@@ -257,6 +257,7 @@ fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
                     }
                 }
             }))
+            @if let Some(others) = others(frontier) { p.note { (others) } }
             p.note { "Keys: " @for key in &frontier.keys { code { (key) } " " } }
         }
     };

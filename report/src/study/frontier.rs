@@ -36,6 +36,24 @@ pub(super) fn cells(point: &Point) -> [String; 5] {
     ]
 }
 
+/// Returns the combinations with samples in which only other vehicles collide, in a sentence: there,
+/// the other columns do not add up to the collisions with the system. `None` if there are none.
+pub(super) fn others(frontier: &Frontier) -> Option<String> {
+    let of_point = |point: &Point| {
+        let settings = frontier.keys.iter().zip(&point.values).map(|(key, value)| format!("{}={value}", short(key)));
+        format!("{} ({})", counted(point.of_others(), "sample"), settings.collect::<Vec<_>>().join(", "))
+    };
+    let counts: Vec<String> = frontier.points.iter().filter(|point| point.of_others() > 0).map(of_point).collect();
+    let tested = frontier.controllers.last().map_or("", String::as_str);
+    (!counts.is_empty()).then(|| {
+        format!(
+            "Only vehicles other than the ego collide with {tested} in {}. Such a sample is induced or not prevented, and is no \
+             collision of the column \"with\".",
+            counts.join(", ")
+        )
+    })
+}
+
 /// Returns the last part of a key.
 pub(super) fn short(key: &str) -> &str {
     key.rsplit('.').next().unwrap_or(key)
@@ -58,6 +76,9 @@ impl Display for FrontierText<'_> {
         write_rows(f, &rows)?;
         for line in error_lines(&frontier.errors, "runs") {
             writeln!(f, "{line}")?;
+        }
+        if let Some(others) = others(frontier) {
+            writeln!(f, "\n{others}")?;
         }
         writeln!(
             f,
@@ -93,4 +114,45 @@ pub(super) fn charts(frontier: &Frontier) -> io::Result<Vec<(&'static str, Strin
         ("induced", scatter(&induced, &title, ["induced, of all samples [%]", prevented])?),
         ("speed", scatter(&lost, &title, ["mean speed lost [m/s]", prevented])?),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_campaign::ledger::Pairs;
+    use closecall_campaign::sensitivity::RunErrors;
+
+    use super::*;
+
+    /// A frontier of two combinations. In the second, so many samples have a collision of other vehicles only.
+    fn frontier(both_of_others: u64) -> Frontier {
+        let point = |value: &str, both_of_others| Point {
+            values: vec![value.to_owned()],
+            samples: 40,
+            collisions_without: 6,
+            collisions: 4 - both_of_others,
+            pairs: Pairs { prevented: 3, induced: 1, both: 3, neither: 33, both_of_others, ..Pairs::default() },
+            prevented: None,
+            induced: None,
+            speed_lost_mps: None,
+            is_optimal: false,
+        };
+        Frontier {
+            scenario: "s".to_owned(),
+            seed: 1,
+            samples: 40,
+            settings: Vec::new(),
+            controllers: vec!["acc".to_owned(), "mis".to_owned()],
+            keys: vec!["actor.ego.driver.ego-stack.mis.hold-s".to_owned()],
+            points: vec![point("1", 0), point("2", both_of_others)],
+            errors: RunErrors::default(),
+        }
+    }
+
+    #[test]
+    fn the_text_explains_figures_that_do_not_add_up_because_others_collide() {
+        let text = FrontierText(&frontier(1)).to_string();
+        let sentence = "Only vehicles other than the ego collide with mis in 1 sample (hold-s=2). Such a sample";
+        assert!(text.contains(sentence), "{text}");
+        assert!(!FrontierText(&frontier(0)).to_string().contains("other than the ego"));
+    }
 }
