@@ -2,6 +2,7 @@
 
 use closecall_campaign::saved::SavedCampaign;
 use closecall_sensors::SensorMode;
+use closecall_traffic::words::counted;
 use rayon::prelude::*;
 
 use super::{FailureRow, order, read_rows};
@@ -98,9 +99,23 @@ pub(crate) fn passes(saved: &SavedCampaign, case: &Case) -> CausesError {
         // fails.
         (Err(error), _) | (_, Err(error)) => return error,
     };
-    let failing: Vec<String> = rows.iter().take(5).map(|row| row.sample.to_string()).collect();
-    let failing = if failing.is_empty() { "none".to_owned() } else { failing.join(", ") };
+    let scenario = &case.file.config().name;
+    let failing: Vec<u64> = rows.iter().filter(|row| row.scenario == *scenario).map(|row| row.sample).collect();
+    let failing = failing_words(&failing);
     CausesError::Passes { sample: case.sample, controller: case.arm.controller.name().to_owned(), failing }
+}
+
+/// Number of failing samples that a message names.
+const NAMED: usize = 5;
+
+/// Returns the numbers of the first failing samples, and how many others there are.
+fn failing_words(samples: &[u64]) -> String {
+    let named = samples.iter().take(NAMED).map(u64::to_string).collect::<Vec<_>>().join(", ");
+    match samples.len() {
+        0 => "none".to_owned(),
+        count if count <= NAMED => named,
+        count => format!("{named} and {}", counted(count - NAMED, "other")),
+    }
 }
 
 /// Returns whether the case fails in the journal of the campaign.
@@ -150,4 +165,17 @@ fn keep(rows: &mut [FailureRow], explanation: Explanation) {
         row.explain(explanation);
     }
     rows.sort_by(order);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_that_names_some_failing_samples_says_how_many_others_fail() {
+        assert_eq!(failing_words(&[]), "none");
+        assert_eq!(failing_words(&[3, 7, 1, 9, 4]), "3, 7, 1, 9, 4");
+        assert_eq!(failing_words(&[3, 7, 1, 9, 4, 2]), "3, 7, 1, 9, 4 and 1 other");
+        assert_eq!(failing_words(&[245; 46]), "245, 245, 245, 245, 245 and 41 others");
+    }
 }
