@@ -57,13 +57,19 @@ fn worst_scenario<'a>(findings: &Findings<'a>) -> Option<&'a ScenarioOverview> {
     worst_first(findings.judged).first().and_then(|gate| named(&gate.scenario)).or(scenarios.first())
 }
 
+/// Returns the title of the evidence. The samples are those of all scenarios, the map is that of one.
+fn evidence_title(scenarios: usize, mapped: Option<&str>) -> String {
+    let samples = if scenarios > 1 { "Worst samples of all scenarios" } else { "Worst samples" };
+    mapped.map_or(samples.to_owned(), |mapped| format!("{samples}, and the map of {mapped}"))
+}
+
 /// Returns the evidence that is looked at first: the outcome map of the worst scenario, and
 /// pictures of the worst samples.
 pub(super) fn evidence(findings: &Findings<'_>) -> io::Result<Markup> {
     let stills = findings.worst_stills();
     let worst = worst_scenario(findings);
     Ok(html! {
-        h2 { "Worst samples" @if let Some(worst) = worst { ", and the map of " (worst.name) } }
+        h2 { (evidence_title(findings.overview.scenarios.len(), worst.map(|worst| worst.name.as_str()))) }
         @if !stills.is_empty() {
             div.stills {
                 @for (still, recording) in stills {
@@ -171,4 +177,16 @@ fn sampled_values(scenario: &ScenarioOverview) -> io::Result<Markup> {
             }
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::evidence_title;
+
+    #[test]
+    fn the_title_does_not_give_the_samples_of_several_scenarios_to_the_mapped_one() {
+        assert_eq!(evidence_title(1, Some("a")), "Worst samples, and the map of a");
+        assert_eq!(evidence_title(2, Some("a")), "Worst samples of all scenarios, and the map of a");
+        assert_eq!(evidence_title(2, None), "Worst samples of all scenarios");
+    }
 }
