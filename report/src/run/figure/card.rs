@@ -10,6 +10,7 @@ use closecall_traffic::{Measured, Time};
 use maud::{Markup, html};
 
 use super::colours::{FRONT, REAR, colour};
+use super::is_another;
 use super::road::{REACH_M, STRETCH, road};
 use crate::campaign::html::page::document;
 use crate::run::film::{Film, Frame, Part};
@@ -143,20 +144,35 @@ fn vehicle(film: &Film, actor: usize, window: Window) -> Markup {
     }
 }
 
+/// Returns a curve as the path of an SVG file. It is interrupted where there is no point, and where the
+/// next point belongs to another vehicle.
+fn path(points: impl Iterator<Item = Option<(Option<usize>, [f64; 2])>>) -> String {
+    let mut path = String::new();
+    let (mut is_open, mut last) = (false, None);
+    for point in points {
+        let Some((vehicle, [x, y])) = point else {
+            is_open = false;
+            continue;
+        };
+        let goes_on = is_open && !is_another(last, vehicle);
+        // Writing to a string cannot fail.
+        let _ = write!(path, "{}{x:.0} {y:.1} ", if goes_on { 'L' } else { 'M' });
+        (is_open, last) = (true, vehicle);
+    }
+    path
+}
+
 /// Returns the headways over time, with a line that moves along.
 fn headways(film: &Film, window: Window) -> Markup {
     let [width, height] = PLOT_PX;
     let span_s = (window.to - window.from).s().max(STEP.s());
     let x = |time: Time| MARGIN_PX + (time - window.from).s() / span_s * (width - 2.0 * MARGIN_PX);
     let y = |thw_s: f64| height - MARGIN_PX - (thw_s.min(MOST_THW_S) / MOST_THW_S) * (height - 1.5 * MARGIN_PX);
-    let curve = |headway: fn(&Frame) -> Measured| {
-        let mut points = String::new();
-        for time in window.times() {
-            if let Some(Ok(thw_s)) = film.frames.get(frame_index(film, time)).map(headway) {
-                let _ = write!(points, "{:.0},{:.1} ", x(time), y(thw_s));
-            }
-        }
-        points
+    let curve = |headway: fn(&Frame) -> (Option<usize>, Measured)| {
+        path(window.times().map(|time| {
+            let (vehicle, thw_s) = headway(film.frames.get(frame_index(film, time))?);
+            Some((vehicle, [x(time), y(thw_s.ok()?)]))
+        }))
     };
     let (left, right) = (format!("{:.0}", x(window.from)), format!("{:.0}", x(window.to)));
     let collisions = film.collisions().iter().map(|collision| collision.time);
@@ -168,8 +184,8 @@ fn headways(film: &Film, window: Window) -> Markup {
                 text x="20" y=(format!("{:.1}", y(thw_s) + 4.0)) font-size="11" text-anchor="end" fill="#55606d" { (format!("{thw_s:.0}")) }
             }
             line x1=(left) x2=(right) y1=(format!("{:.1}", y(CRITICAL_THW_S))) y2=(format!("{:.1}", y(CRITICAL_THW_S))) stroke=(CRITICAL) stroke-dasharray="4 3" {}
-            polyline fill="none" stroke=(FRONT) stroke-width="2" points=(curve(|frame| frame.margins.thw_front_s)) {}
-            polyline fill="none" stroke=(REAR) stroke-width="2" points=(curve(|frame| frame.margins.thw_rear_s)) {}
+            path fill="none" stroke=(FRONT) stroke-width="2" d=(curve(|frame| (frame.lead(), frame.margins.thw_front_s))) {}
+            path fill="none" stroke=(REAR) stroke-width="2" d=(curve(|frame| (frame.follower(), frame.margins.thw_rear_s))) {}
             @for time in shown {
                 line x1=(format!("{:.0}", x(time))) x2=(format!("{:.0}", x(time))) y1="8" y2=(height - MARGIN_PX) stroke=(CRITICAL) stroke-width="2" {}
             }
@@ -181,5 +197,22 @@ fn headways(film: &Film, window: Window) -> Markup {
             text x=(left) y=(height - 8.0) font-size="11" fill="#55606d" { (format!("{:.1} s", window.from.s())) }
             text x=(right) y=(height - 8.0) font-size="11" text-anchor="end" fill="#55606d" { (format!("{:.1} s", window.to.s())) }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::path;
+
+    #[test]
+    fn a_curve_does_not_join_the_headways_of_two_vehicles() {
+        let point = |vehicle, x| Some((vehicle, [x, 1.0]));
+        let of_two = [point(Some(2), 0.0), point(Some(2), 1.0), point(Some(3), 2.0), point(Some(3), 3.0)];
+        assert_eq!(path(of_two.into_iter()), "M0 1.0 L1 1.0 M2 1.0 L3 1.0 ");
+        let with_gap = [point(Some(2), 0.0), None, point(Some(2), 2.0), point(Some(2), 3.0)];
+        assert_eq!(path(with_gap.into_iter()), "M0 1.0 M2 1.0 L3 1.0 ");
+        // A vehicle in the path is not yet in the lane.
+        let without_name = [point(None, 0.0), point(Some(2), 1.0)];
+        assert_eq!(path(without_name.into_iter()), "M0 1.0 L1 1.0 ");
     }
 }

@@ -10,8 +10,8 @@ use closecall_traffic::Time;
 
 use super::chart::{Chart, Curve, Range, range_of};
 use super::colours::{EGO, FRONT, REAR, colour, legend_name};
-use super::strip;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
+use super::{points_over_time, strip};
 use crate::run::film::{Film, Frame, ego_state_name};
 use closecall_scenarios::outcome::{CRITICAL_THW_S, Moment};
 
@@ -221,7 +221,9 @@ fn frames_shown(films: &[Film], film: &Film) -> std::ops::Range<usize> {
 }
 
 /// Returns a curve over time for each film and each of `curves`, which are pairs of a name and a
-/// colour. `value` reads the value of the curve with the given index from a frame.
+/// colour: the first of the vehicle ahead, the second of the vehicle behind. `value` reads the value
+/// of the curve with the given index from a frame. A curve is interrupted where another vehicle
+/// begins.
 fn over_time(
     films: &[Film],
     curves: &[(&str, &'static str)],
@@ -229,10 +231,11 @@ fn over_time(
 ) -> Vec<Curve<'static>> {
     let curve = |film_index: usize, curve_index: usize| {
         let (name, colour) = curves[curve_index];
+        let vehicle: fn(&Frame) -> Option<usize> = if curve_index == 0 { Frame::lead } else { Frame::follower };
         Curve {
             name: named(films, film_index, name),
             stroke: stroke(films, film_index, colour),
-            points: films[film_index].frames.iter().map(|frame| (frame.time.s(), value(frame, curve_index))).collect(),
+            points: points_over_time(&films[film_index].frames, vehicle, |frame| value(frame, curve_index)),
         }
     };
     (0..films.len())

@@ -3,8 +3,8 @@
 
 use super::chart::{Chart, Curve, range_of};
 use super::colours::{FRONT, REAR};
-use super::strip;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
+use super::{points_over_time, strip};
 use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
@@ -33,14 +33,14 @@ pub fn still(film: &Film) -> String {
     );
     strip::draw(&mut svg, (film, None), frame_index, (STRIP, REACH_M));
     let start = film.frames.first().map_or(0.0, |frame| frame.time.s());
-    let curve = |name: &str, colour, value: fn(&Frame) -> Option<f64>| Curve {
+    let curve = |name: &str, colour, vehicle: fn(&Frame) -> Option<usize>, value: fn(&Frame) -> Option<f64>| Curve {
         name: name.to_owned(),
         stroke: Stroke::solid(colour, 1.8),
-        points: film.frames.iter().map(|frame| (frame.time.s(), value(frame))).collect(),
+        points: points_over_time(&film.frames, vehicle, value),
     };
     let curves = vec![
-        curve("front", FRONT, |frame| frame.margins.thw_front_s.ok()),
-        curve("rear", REAR, |frame| frame.margins.thw_rear_s.ok()),
+        curve("front", FRONT, Frame::lead, |frame| frame.margins.thw_front_s.ok()),
+        curve("rear", REAR, Frame::follower, |frame| frame.margins.thw_rear_s.ok()),
     ];
     let values = curves.iter().flat_map(|curve| curve.points.iter().filter_map(|point| point.1));
     let top = range_of(values, [0.0, 1.0])[1].min(MAX_THW_S);

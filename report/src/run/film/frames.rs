@@ -112,6 +112,18 @@ pub struct Frame {
     pub(in crate::run) rear_image: Option<RearImage>,
 }
 
+impl Frame {
+    /// Returns the index of the vehicle ahead of the ego in its lane.
+    pub(in crate::run) fn lead(&self) -> Option<usize> {
+        self.margins.lead.ok().map(|lead| lead.actor)
+    }
+
+    /// Returns the index of the vehicle behind the ego in its lane.
+    pub(in crate::run) fn follower(&self) -> Option<usize> {
+        self.margins.follower
+    }
+}
+
 /// A reference level of a plotted quantity.
 #[derive(Clone, Debug)]
 pub(in crate::run) struct Limit {
