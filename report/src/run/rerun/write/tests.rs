@@ -264,9 +264,10 @@ fn rear_radars_have_points_with_radial_speeds_and_ghosts_are_no_vehicles() {
         let time = TimelineName::from_static_str(TIME_TIMELINE);
         let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == entity);
         for chunk in rows.filter(|chunk| chunk.timelines().contains_key(&time)) {
-            for column in chunk.components().values() {
+            let columns = chunk.components().values().map(|column| (column.descriptor.component.as_str(), column));
+            for (name, column) in columns.collect::<BTreeMap<_, _>>() {
                 let values = column.list_array.values();
-                match column.descriptor.component.as_str() {
+                match name {
                     "radial_mps" => {
                         speeds_mps.extend_from_slice(values.as_primitive::<Float64Type>().values());
                         units.extend(column.descriptor.component_type.map(|unit| unit.as_str().to_owned()));
