@@ -155,7 +155,9 @@ impl Folder {
                 return Err(FolderError::OtherCampaign { path: path.to_owned(), differences });
             }
             if grows {
-                folder.write_manifest(manifest)?;
+                // A seed that was known when the campaign began was known to all its samples.
+                let has_drawn_seed = there.has_drawn_seed && manifest.has_drawn_seed;
+                folder.write_manifest(&Manifest { has_drawn_seed, ..manifest.clone() })?;
             }
             if !resume {
                 return Err(FolderError::AlreadyThere { path: path.to_owned() });

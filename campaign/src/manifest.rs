@@ -179,6 +179,10 @@ pub struct Manifest {
     /// nothing in the scenario.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without_effect: Vec<(String, String)>,
+    /// True if the seed was drawn when the campaign began, so that nobody knew it before. A seed
+    /// that was named stays named, however the campaign is resumed.
+    #[serde(default)]
+    pub has_drawn_seed: bool,
     /// True if the campaign has chosen its folder itself, so that a later one may take its place.
     #[serde(default)]
     pub replaceable: bool,
@@ -192,7 +196,7 @@ const fn is_zero(count: &u32) -> bool {
 }
 
 /// Keys of a manifest that do not affect the outcomes, or whose differences another message names.
-const INCIDENTAL: [&str; 4] = ["command", "working_folder", "replaceable", "controllers"];
+const INCIDENTAL: [&str; 5] = ["command", "working_folder", "has_drawn_seed", "replaceable", "controllers"];
 /// Keys of a scenario in a manifest that do not affect the outcomes, which follow from its text.
 const INCIDENTAL_OF_SCENARIO: [&str; 2] = ["path", "settings"];
 
@@ -231,8 +235,8 @@ impl Manifest {
     }
 
     /// Returns the manifest as JSON without the parts that do not affect the outcomes: the command
-    /// line, whether it named a folder, the working folder, the paths of the scenario files, the
-    /// partition, and the build of the program. It is the same for a campaign that ran in one go,
+    /// line, whether it named a folder or a seed, the working folder, the paths of the scenario files,
+    /// the partition, and the build of the program. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {
         let mut whole = self.whole();
@@ -240,7 +244,7 @@ impl Manifest {
             whole.closecall_version.truncate(end);
         }
         let mut value = serde_json::to_value(whole).ok()?;
-        for name in ["command", "replaceable", "working_folder"] {
+        for name in ["command", "has_drawn_seed", "replaceable", "working_folder"] {
             value.as_object_mut()?.remove(name);
         }
         for scenario in value.get_mut("scenarios")?.as_array_mut()? {
@@ -406,6 +410,7 @@ mod tests {
             working_folder: None,
             retry_crashed: 0,
             without_effect: Vec::new(),
+            has_drawn_seed: false,
             replaceable: false,
             command: vec!["closecall".to_owned()],
         }
@@ -453,6 +458,8 @@ mod tests {
         other.scenarios[0].path = "b.toml".to_owned();
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
         other.replaceable = true;
+        assert_eq!(manifest().differences(&other), Vec::<String>::new());
+        other.has_drawn_seed = true;
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
         other.partition = Some("1/3".parse().unwrap());
         assert_eq!(manifest().determining_json(), other.determining_json());

@@ -53,6 +53,8 @@ pub struct Plan {
     /// Scenarios and members of a driver ensemble that are not run, because the member changes
     /// nothing in the scenario.
     pub without_effect: Vec<(String, String)>,
+    /// Whether the seed was drawn when the campaign began, so that nobody knew it before.
+    pub has_drawn_seed: bool,
 }
 
 impl Plan {
@@ -121,6 +123,7 @@ impl Plan {
             workers: Workers::default(),
             retry_crashed: 0,
             without_effect: Vec::new(),
+            has_drawn_seed: false,
         })
     }
 
@@ -269,6 +272,7 @@ impl Plan {
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
             retry_crashed: self.retry_crashed,
             without_effect: self.without_effect.clone(),
+            has_drawn_seed: self.has_drawn_seed,
             replaceable: false,
             command,
         })

@@ -101,16 +101,17 @@ pub(super) fn after_verdict(judged: &Judgement) -> &'static str {
 
 /// Returns the remark of a verdict on a controller from outside whose samples were known before
 /// the run: the controller may have been tuned on them. `None` for a controller of this program,
-/// and for a campaign without a gate. `can_draw` says whether the command could have drawn a seed:
-/// the parts of a campaign need the same one.
-pub(super) fn known_seed(judged: &Judgement, manifest: &Manifest, can_draw: bool) -> Option<String> {
+/// for a seed that was drawn when the campaign began, and for a campaign that does not judge.
+/// `can_draw` says whether the command could have drawn a seed: the parts of a campaign need the
+/// same one.
+pub(super) fn known_seed(judges: bool, manifest: &Manifest, can_draw: bool) -> Option<String> {
     let is_from_outside = manifest.arms.last().is_some_and(|tested| tested.built_in().is_none());
     let remedy = match (can_draw, session::is_active()) {
         (false, _) => "",
         (true, false) => "; `--judge-seed secret` draws one",
         (true, true) => "; `judge_seed=\"secret\"` draws one",
     };
-    (is_from_outside && judged.has_gates())
+    (is_from_outside && judges && !manifest.has_drawn_seed)
         .then(|| format!("the seed was known before the run: a controller could recognise its samples{remedy}"))
 }
 

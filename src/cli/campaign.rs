@@ -183,6 +183,14 @@ impl FromStr for JudgeSeed {
     }
 }
 
+/// The seed of a campaign, and how it came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CampaignSeed {
+    seed: u64,
+    /// True if the seed was drawn when the campaign began, so that nobody knew it before.
+    is_drawn: bool,
+}
+
 impl CampaignArgs {
     /// Returns true if the seed is to be drawn. The parts of a campaign need the same one.
     fn draws_seed(&self) -> bool {
@@ -193,14 +201,18 @@ impl CampaignArgs {
         }
     }
 
-    /// Returns the seed. A campaign that is resumed has the one that was drawn.
-    fn seed(&self) -> Result<u64, CliError> {
+    /// Returns the seed. A campaign that is resumed has the seed of its folder. The folder says how
+    /// the seed came about: a named one was known, and one that was drawn was unknown.
+    fn seed(&self) -> Result<CampaignSeed, CliError> {
+        let resumed = self.results.resumed();
         if !self.draws_seed() {
             let judging = match self.judge_seed {
                 Some(JudgeSeed::Number(seed)) => Some(seed),
                 _ => self.seed,
             };
-            return Ok(judging.unwrap_or(0));
+            let seed = judging.unwrap_or(0);
+            let was_drawn = |there: &Manifest| there.has_drawn_seed && there.sampling.seed == seed;
+            return Ok(CampaignSeed { seed, is_drawn: resumed.is_some_and(|(_, there)| was_drawn(&there)) });
         }
         if self.partition.is_some() {
             return Err(CliError::usage(format!(
@@ -208,12 +220,24 @@ impl CampaignArgs {
                 Argument("judge-seed")
             )));
         }
-        let drawn = || RandomState::new().build_hasher().finish();
-        Ok(self.results.resumed_seed().unwrap_or_else(drawn))
-    }
-
-    fn sampling(&self) -> Result<Sampling, CliError> {
-        Ok(Sampling { seed: self.seed()?, design: self.design.plain(), samples: self.plan.samples() })
+        let Some((folder, there)) = resumed else {
+            return Ok(CampaignSeed { seed: RandomState::new().build_hasher().finish(), is_drawn: true });
+        };
+        let (seed, is_drawn, folder) = (there.sampling.seed, there.has_drawn_seed, folder.display());
+        match (is_drawn, self.judge_seed) {
+            (true, _) => {}
+            (false, Some(_)) => {
+                return Err(CliError::usage(format!(
+                    "{} secret: the campaign in {folder} began with the seed {seed}, which was named: resume it with {} {seed}, or draw a seed for another folder",
+                    Argument("judge-seed"),
+                    Argument("seed")
+                )));
+            }
+            (false, None) => print_error(format_args!(
+                "{folder}: its campaign began with the seed {seed}, which was named, and goes on with it\n"
+            )),
+        }
+        Ok(CampaignSeed { seed, is_drawn })
     }
 
     fn workers(&self) -> Result<Workers, CliError> {
@@ -282,7 +306,10 @@ impl CampaignArgs {
     /// Returns the plan of what runs.
     fn plan(&self, files: Vec<ScenarioFile>, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let ensemble = self.ensemble.apply(files)?;
-        let mut plan = Plan::new(ensemble.entries, self.sampling()?, controllers)?;
+        let CampaignSeed { seed, is_drawn } = self.seed()?;
+        let sampling = Sampling { seed, design: self.design.plain(), samples: self.plan.samples() };
+        let mut plan = Plan::new(ensemble.entries, sampling, controllers)?;
+        plan.has_drawn_seed = is_drawn;
         plan.without_effect = ensemble.without_effect;
         plan.use_sensors(self.sensors.map(SensorsChoice::mode))?;
         plan.partition = self.partition;
@@ -310,8 +337,6 @@ pub(super) struct Planned<'a> {
     pub(super) time_budget: Option<Duration>,
     /// The samples that run before the others.
     pub(super) first: EarlierFailures,
-    /// Whether the seed was drawn for this campaign.
-    pub(super) has_drawn_seed: bool,
     /// Whether the command can draw the seed.
     pub(super) can_draw_seed: bool,
 }
@@ -434,7 +459,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         folder,
         resume: args.results.is_resumed(),
         format: args.format,
-        has_drawn_seed: args.draws_seed(),
+        can_draw_seed: true,
     };
     rare.run(&args.plan(files, controllers)?)
 }
@@ -471,7 +496,6 @@ pub(super) fn run_campaign(args: &CampaignArgs, tell: &mut dyn FnMut(&Conclusion
         until_certain: args.plan.until_certain,
         time_budget: args.plan.time_budget(),
         first: args.failures_first(&plan)?,
-        has_drawn_seed: args.draws_seed(),
         can_draw_seed: args.partition.is_none(),
     };
     carry_out(&planned, &mut Alone, tell)
@@ -496,7 +520,6 @@ pub(super) struct Judged<'a> {
     resumed: u64,
     /// Where it ran, and the share of the checks in the time.
     place: String,
-    has_drawn_seed: bool,
 }
 
 impl Conclusion<'_> {
@@ -545,7 +568,7 @@ impl Judged<'_> {
         print_text(FlakyText(&tally.overview));
         print_text(VerdictText { judged, scenarios: works.len() });
         print_text(after_verdict(judged));
-        if self.has_drawn_seed {
+        if manifest.has_drawn_seed {
             outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
         }
     }
@@ -614,9 +637,7 @@ pub(super) fn carry_out(
     let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let mut judged = tally.judgement();
     judged.add_invalid(watch.finish());
-    if !planned.has_drawn_seed
-        && let Some(remark) = known_seed(&judged, &manifest, planned.can_draw_seed)
-    {
+    if let Some(remark) = known_seed(judged.has_gates(), &manifest, planned.can_draw_seed) {
         judged.add_remark(remark);
     }
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
@@ -627,7 +648,6 @@ pub(super) fn carry_out(
         simulated_s: progress.simulated_s,
         resumed: progress.resumed,
         place: format!("{}{}", campaign.place(), progress.spent.check_share()),
-        has_drawn_seed: planned.has_drawn_seed,
     }));
     // A report that cannot be written does not cost the verdict.
     let written = match results.complete() {

@@ -172,7 +172,6 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
         until_certain: false,
         time_budget: None,
         first: EarlierFailures::default(),
-        has_drawn_seed: false,
         can_draw_seed: false,
     };
     carry_out(&planned, &mut chain, &mut |conclusion| conclusion.print(args.format))

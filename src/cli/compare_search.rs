@@ -117,7 +117,7 @@ impl SearchArgs {
             folder: self.out.as_deref(),
             resume: self.resume,
             format,
-            has_drawn_seed: false,
+            can_draw_seed: false,
         };
         rare.run(&plan)
     }

@@ -85,7 +85,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let saved = SavedCampaign::of(merged.folder.clone())?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let mut judged = tally.judgement();
-    if let Some(remark) = known_seed(&judged, saved.manifest(), false) {
+    if let Some(remark) = known_seed(judged.has_gates(), saved.manifest(), false) {
         judged.add_remark(remark);
     }
     let report =

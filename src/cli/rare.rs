@@ -31,6 +31,7 @@ use serde_json::{Value, json};
 
 use super::CliError;
 use super::actions::{command_for, quoted};
+use super::advice::known_seed;
 use super::args::Format;
 use super::backend::{check_backend, check_networks};
 use super::campaign::progress_bar;
@@ -126,8 +127,8 @@ pub(super) struct Rare<'a> {
     pub(super) folder: Option<&'a Path>,
     pub(super) resume: bool,
     pub(super) format: Format,
-    /// Whether the seed was drawn for this campaign.
-    pub(super) has_drawn_seed: bool,
+    /// Whether the command can draw the seed.
+    pub(super) can_draw_seed: bool,
 }
 
 impl RareArgs {
@@ -204,14 +205,23 @@ impl Rare<'_> {
             }
         }
         bar.finish_and_clear();
+        // A search has no gate, and judges by its exit code.
+        let judges = self.gate.is_some() || self.method == Method::Search;
+        let remark = known_seed(judges, &manifest.campaign, self.can_draw_seed);
         let seed = campaign.works.first().map(|work| work.sampling.seed);
-        let result = self.json(&reports, seed);
+        let result = self.json(&reports, seed, remark.as_deref());
         if let Some(folder) = &folder {
             print_written(&folder.write(&result)?);
         }
         match self.format {
             Format::Json => outln!("{result:#}"),
-            Format::Human => self.print(&reports, &campaign.works, plan.sensors),
+            Format::Human => {
+                self.print(&reports, &campaign.works, plan.sensors);
+                remark.iter().for_each(|remark| outln!("  {remark}"));
+                if manifest.campaign.has_drawn_seed {
+                    outln!("  drawn for this campaign: --seed {}", manifest.campaign.sampling.seed);
+                }
+            }
         }
         if self.method == Method::Search {
             for (report, work) in reports.iter().zip(&campaign.works) {
@@ -284,12 +294,13 @@ impl Rare<'_> {
     }
 
     /// Returns the result for programs.
-    fn json(&self, reports: &[RareReport], seed: Option<u64>) -> Value {
+    fn json(&self, reports: &[RareReport], seed: Option<u64>, remark: Option<&str>) -> Value {
         let verdicts = self.gate.map(|gate| {
             let words: Vec<&str> = reports.iter().map(|report| self.word(report)).collect();
             json!({ "max_probability": gate.max(), "confidence": gate.confidence(), "verdicts": words })
         });
-        stamped(json!({ "scenarios": reports, "gate": verdicts }), seed, None)
+        let remarks: Vec<&str> = remark.into_iter().collect();
+        stamped(json!({ "scenarios": reports, "gate": verdicts, "remarks": remarks }), seed, None)
     }
 
     /// Reduces the case that a search has found to the smallest one, and writes it as a scenario into
@@ -338,9 +349,6 @@ impl Rare<'_> {
                     "look: {command}  # {distance_sd:.2} standard deviations from the nominal case\n"
                 ));
             }
-        }
-        if let Some(work) = works.first().filter(|_| self.has_drawn_seed) {
-            outln!("  drawn for this campaign: --seed {}", work.sampling.seed);
         }
     }
 }

@@ -80,12 +80,12 @@ impl ResultsArgs {
         self.resume
     }
 
-    /// Returns the seed of the campaign that is to be resumed, if there is one.
-    pub(super) fn resumed_seed(&self) -> Option<u64> {
+    /// Returns the folder and the manifest of the campaign that is to be resumed, if there is one.
+    pub(super) fn resumed(&self) -> Option<(&Path, Manifest)> {
         let folder = self.folder().filter(|_| self.resume)?;
         let rare = || RareManifest::read(folder).map(|manifest| manifest.campaign);
         let manifest = SavedCampaign::open(folder).ok().map(|saved| saved.manifest().clone()).or_else(rare);
-        manifest.map(|manifest| manifest.sampling.seed)
+        manifest.map(|manifest| (folder, manifest))
     }
 
     /// Returns the folder of the results; `None` if they are not kept.

@@ -362,6 +362,67 @@ fn a_secret_seed_is_drawn_stated_and_resumed() {
     assert!(manifest.contains(&format!("\"seed\": {second}")), "{manifest}");
     let refused = campaign(&path, &["--judge-seed", "secret", "--seed", "1"]);
     assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+    // A campaign that grows keeps the fact, also if the command names the number that was drawn.
+    let grown = stdout(
+        &campaign(
+            &path,
+            &["-n", "3", "--sensors", "object", "--seed", &second, "--no-gate", "--record", "worst:0", "--resume"]
+                .iter()
+                .copied()
+                .chain(["--out", out.to_str().unwrap()])
+                .collect::<Vec<_>>(),
+        ),
+        0,
+    );
+    assert_eq!(seed_of(&grown), second);
+    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(manifest.contains("\"has_drawn_seed\": true") && manifest.contains("\"samples\": 3"), "{manifest}");
+}
+
+#[test]
+fn a_named_seed_does_not_become_a_secret_one_by_resumption() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let path = library("overtake-without-brake");
+    let run = |more: &[&str]| {
+        let kept = ["-n", "2", "--sensors", "object", "--record", "worst:0", "--out", out.to_str().unwrap()];
+        campaign(&path, &[&kept[..], more].concat())
+    };
+    let is_named = || {
+        let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+        assert!(manifest.contains("\"has_drawn_seed\": false") && manifest.contains("\"seed\": 5"), "{manifest}");
+    };
+    stdout(&run(&["--seed", "5", "--no-gate"]), 0);
+    is_named();
+    for more in [&[][..], &["-n", "3"]] {
+        let refused = run(&[&["--judge-seed", "secret", "--no-gate", "--resume"], more].concat());
+        let said = message(&refused);
+        assert_eq!(code(&refused), 2, "{said}");
+        assert!(said.contains("began with the seed 5, which was named"), "{said}");
+        assert!(said.contains("--seed 5"), "{said}");
+        is_named();
+    }
+    let resumed = stdout(&run(&["--seed", "5", "--no-gate", "--resume"]), 0);
+    assert!(!resumed.contains("drawn for this campaign"), "{resumed}");
+}
+
+#[test]
+fn a_preset_that_draws_goes_on_with_a_seed_that_was_named() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let path = library("overtake-without-brake");
+    let run = |more: &[&str]| {
+        let kept = ["--preset", "pr", "-n", "2", "--sensors", "object", "--record", "worst:0"];
+        campaign(&path, &[&kept[..], &["--out", out.to_str().unwrap()], more].concat())
+    };
+    let first = run(&["--seed", "5"]);
+    assert!(out.join("manifest.json").is_file(), "{}", stderr(&first));
+    let resumed = run(&["--resume"]);
+    assert_eq!(code(&resumed), code(&first), "{}", stderr(&resumed));
+    assert!(message(&resumed).contains("began with the seed 5, which was named"), "{}", message(&resumed));
+    assert!(!String::from_utf8_lossy(&resumed.stdout).contains("drawn for this campaign"));
+    let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
+    assert!(manifest.contains("\"has_drawn_seed\": false"), "{manifest}");
 }
 
 #[test]

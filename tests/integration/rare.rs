@@ -5,6 +5,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use closecall_testing::has_python;
+
 use crate::support::{closecall, code, folder, json, json_file, message, stderr, stdout};
 
 /// The collision probability of the fixture, by construction.
@@ -225,6 +227,59 @@ fn a_drawn_seed_is_stated_resumed_and_kept() {
     assert!(result["closecall_version"].is_string());
     let resumed = stdout(&rare(&format!("{words} --resume")), 0);
     assert!(resumed.contains(&format!("--seed {seed}")), "{resumed}");
+    // With more runs, and with the number that was drawn: the folder says how it came about.
+    let named = words.replace("--judge-seed secret", &format!("--seed {seed}")).replace("-n 3000", "-n 4000");
+    let grown = stdout(&rare(&format!("{named} --resume")), 0);
+    assert!(grown.contains(&format!("drawn for this campaign: --seed {seed}")), "{grown}");
+    let manifest = fs::read_to_string(out.join("rare-manifest.json")).unwrap();
+    assert!(manifest.contains("\"has_drawn_seed\": true"), "{manifest}");
+}
+
+#[test]
+fn a_named_seed_of_weighted_runs_does_not_become_a_secret_one_by_resumption() {
+    let place = folder();
+    let out = place.path().join("out");
+    let words = |seed: &str| format!("--design importance --event collision -n 3000 {seed} --out {}", out.display());
+    stdout(&rare(&words("--seed 5")), 0);
+    let refused = rare(&words("--judge-seed secret --resume"));
+    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+    assert!(message(&refused).contains("began with the seed 5, which was named"), "{}", message(&refused));
+    let manifest = fs::read_to_string(out.join("rare-manifest.json")).unwrap();
+    assert!(manifest.contains("\"has_drawn_seed\": false"), "{manifest}");
+}
+
+#[test]
+fn a_rare_event_of_a_controller_from_outside_says_that_its_seed_was_known() {
+    const REMARK: &str = "the seed was known before the run: a controller could recognise its samples";
+    if !has_python() {
+        return;
+    }
+    let path = fixture();
+    let run = |controller: &str, words: &str| {
+        let fixed =
+            ["campaign", path.to_str().unwrap(), "--event", "collision", "-n", "20", "--controller", controller];
+        let output = closecall(fixed.into_iter().chain(words.split_whitespace()));
+        assert!([0, 1, 4].contains(&code(&output)), "{words}: {}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let outside = "exec:python3 examples/acc_controller.py";
+    let limit = "--controller-timeout-ms 60000";
+    for design in ["importance --max-probability 0.5", "subset --max-probability 0.5", "search"] {
+        let text = run(outside, &format!("--design {design} {limit} --seed 5"));
+        assert!(text.contains(&format!("\n  {REMARK}; `--judge-seed secret` draws one\n")), "{design}: {text}");
+        let text = run(outside, &format!("--design {design} {limit} --judge-seed secret"));
+        assert!(!text.contains("the seed was known"), "{design}: {text}");
+        let text = run("acc", &format!("--design {design} --seed 5"));
+        assert!(!text.contains("the seed was known"), "{design}: {text}");
+    }
+    let measured = run(outside, &format!("--design importance {limit} --seed 5"));
+    assert!(!measured.contains("the seed was known"), "{measured}");
+    let text = run(outside, &format!("--design importance --max-probability 0.5 {limit} --format json"));
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(value["remarks"][0].as_str().unwrap().starts_with(REMARK), "{value}");
+    let text = run("acc", "--design importance --max-probability 0.5 --format json");
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(value["remarks"].as_array().unwrap().len(), 0, "{value}");
 }
 
 #[test]

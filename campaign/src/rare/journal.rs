@@ -146,7 +146,7 @@ impl RareFolder {
             return Err(FolderError::NotACampaign { path: path.to_owned() });
         }
         let lock = Lock::acquire(path)?;
-        let mut has_grown = false;
+        let (mut has_grown, mut has_drawn_seed) = (false, manifest.campaign.has_drawn_seed);
         if !is_new {
             let fail = |message: String| FolderError::Content { path: file.clone(), line: 1, message };
             let text = input::read_text(&file)
@@ -160,10 +160,14 @@ impl RareFolder {
                 return Err(FolderError::AlreadyThere { path: path.to_owned() });
             }
             has_grown = manifest.budget > there.budget;
+            // A seed that was known when the campaign began was known to all its runs.
+            has_drawn_seed &= there.campaign.has_drawn_seed;
         }
         if is_new || has_grown {
+            let campaign = Manifest { has_drawn_seed, ..manifest.campaign.clone() };
+            let written = RareManifest { campaign, ..manifest.clone() };
             write_file(&file, |out| {
-                serde_json::to_writer_pretty(&mut *out, manifest)?;
+                serde_json::to_writer_pretty(&mut *out, &written)?;
                 out.write_all(b"\n")
             })?;
         }
