@@ -9,7 +9,7 @@ use closecall_traffic::{
 };
 
 use crate::coverage::CoveragePlan;
-use crate::criteria::Quantity;
+use crate::criteria::{Expression, Quantity};
 use crate::grip::lateral_grip_mps2;
 
 use crate::run_key::RunKey;
@@ -182,6 +182,11 @@ impl ScenarioConfig {
                 let problem = Problem::UnknownWord { value: mark.clone(), allowed };
                 return Err(ConfigError::new(mark, problem).within("checks"));
             }
+        }
+        if let Some([first, second]) = Expression::contradiction(&self.gate.require) {
+            let rule = format!("`{first}` and `{second}` bound the same value on the same side");
+            let problem = Problem::Contradiction { other: "gate.require", rule };
+            return Err(ConfigError::new("require", problem).within("gate"));
         }
         Range::closed(0.0, 1.0).check(self.expects_share, "expects-share")?;
         if let Some(max) = self.gate.max_probability {

@@ -77,6 +77,31 @@ impl FromStr for Setting {
 }
 
 impl Setting {
+    /// Returns the first two settings that contradict each other: the later one [undoes](Self::undoes)
+    /// the earlier one.
+    pub fn contradiction(settings: &[Self]) -> Option<[&Self; 2]> {
+        settings.iter().enumerate().find_map(|(index, later)| {
+            let earlier = settings[..index].iter().find(|earlier| later.undoes(earlier))?;
+            Some([earlier, later])
+        })
+    }
+
+    /// Returns true if nothing is left of an `earlier` setting after this one: it has the same key
+    /// and another value, it replaces the table in which the earlier key is, or it gives a parameter
+    /// a distribution that the earlier one fixed. A part of a table that an earlier setting gave,
+    /// and a value of a parameter whose distribution it gave, are no contradiction.
+    pub fn undoes(&self, earlier: &Self) -> bool {
+        if self.key == earlier.key {
+            return self.value != earlier.value;
+        }
+        let replaces_table = earlier.key.starts_with(&self.key);
+        let is_of_same_parameter = match (&earlier.key[..], &self.key[..]) {
+            ([fixed], [table, name, ..]) => table == "parameters" && name == fixed,
+            _ => false,
+        };
+        replaces_table || is_of_same_parameter
+    }
+
     /// Sets the value in `document`.
     ///
     /// # Errors
@@ -191,6 +216,36 @@ mod tests {
     #[test]
     fn a_parameter_is_fixed_by_its_name() {
         assert!(set("brake-mps2=6.5").unwrap().contains("brake-mps2 = { fixed = 6.5 }"));
+    }
+
+    #[test]
+    fn a_setting_that_undoes_an_earlier_one_is_found() {
+        let found = |texts: &[&str]| {
+            let settings: Vec<Setting> = texts.iter().map(|text| text.parse().unwrap()).collect();
+            Setting::contradiction(&settings).map(|pair| pair.map(ToString::to_string))
+        };
+        for texts in [
+            ["brake-mps2=6", "brake-mps2=4"],
+            ["actor.rear.start.behind.gap-m=90", "actor.rear . start.behind.gap-m = 120"],
+            ["actor.rear.start.behind.gap-m=90", "actor.rear.start={behind={gap-m=120}}"],
+            ["brake-mps2=6", "parameters.brake-mps2.uniform.min=5"],
+            ["acc:aeb.trigger-mps2=5", "acc:aeb.trigger-mps2=6"],
+        ] {
+            let [first, second] = found(&texts).unwrap_or_else(|| panic!("{texts:?}"));
+            assert_eq!(first, texts[0]);
+            assert_eq!(second.replace(' ', ""), texts[1].replace(' ', ""));
+        }
+        for texts in [
+            ["brake-mps2=6", "brake-mps2=6"],
+            ["brake-mps2=6", "brake=4"],
+            ["parameters.brake-mps2.uniform.min=5", "parameters.brake-mps2.uniform.max=7"],
+            ["parameters.brake-mps2={uniform={min=4,max=8}}", "brake-mps2=6"],
+            ["actor.rear.start={behind={gap-m=120}}", "actor.rear.start.behind.gap-m=90"],
+            ["acc:aeb.trigger-mps2=5", "acc+aeb:aeb.trigger-mps2=6"],
+            ["aeb.trigger-mps2=5", "acc:aeb.trigger-mps2=6"],
+        ] {
+            assert_eq!(found(&texts), None, "{texts:?}");
+        }
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::error::ErrorKind;
+use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 use closecall_campaign::arguments::parsed_list;
 use closecall_recorded::lane_change::LaneReliability;
 use closecall_recorded::trajectory_data::{
@@ -255,16 +256,52 @@ impl ReadArgs {
     }
 }
 
-/// Changes of single values of a scenario.
-#[derive(Clone, Debug, Default, Args, Deserialize)]
+/// Changes of single values of a scenario. On the command line no change undoes another.
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct SetArgs {
+    #[serde(rename = "set", deserialize_with = "parsed_list")]
+    pub(super) settings: Vec<Setting>,
+}
+
+/// The option of [`SetArgs`].
+#[derive(Args)]
+struct SetOption {
     /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`)
     /// or by a parameter (`brake-mps2=6`); can be given more than once. In a campaign
     /// `ARM:KEY=VALUE` sets a value of the ego stack in one arm (`acc+aeb:aeb.trigger-mps2=5`)
     #[arg(long = "set", value_name = "KEY=VALUE", help_heading = heading::SCENARIO)]
-    #[serde(rename = "set", deserialize_with = "parsed_list")]
-    pub(super) settings: Vec<Setting>,
+    settings: Vec<Setting>,
+}
+
+impl FromArgMatches for SetArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Self::from_arg_matches_mut(&mut matches.clone())
+    }
+
+    fn from_arg_matches_mut(matches: &mut ArgMatches) -> Result<Self, clap::Error> {
+        let SetOption { settings } = SetOption::from_arg_matches_mut(matches)?;
+        if let Some([first, second]) = Setting::contradiction(&settings) {
+            let message = format!("--set {first} and --set {second} contradict each other: give one of them");
+            return Err(clap::Error::raw(ErrorKind::ValueValidation, message));
+        }
+        Ok(Self { settings })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for SetArgs {
+    fn augment_args(command: Command) -> Command {
+        SetOption::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        SetOption::augment_args_for_update(command)
+    }
 }
 
 impl SetArgs {

@@ -49,6 +49,14 @@ fn parameter(text: &str) -> Result<(String, String), String> {
 
 pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
     protect(std::slice::from_ref(&args.file), &[("--out", Some(&args.output))])?;
+    for (index, (name, value)) in args.parameters.iter().enumerate() {
+        let is_other = |(earlier, other): &&(String, String)| earlier == name && other != value;
+        if let Some((_, other)) = args.parameters[..index].iter().find(is_other) {
+            return Err(CliError::usage(format!(
+                "--parameter {name}={other} and --parameter {name}={value} contradict each other: give one of them"
+            )));
+        }
+    }
     let options =
         ImportOptions { ego: args.ego.clone(), parameters: args.parameters.clone(), value_set: args.value_set };
     let imported = import(&args.file, &options)?;

@@ -21,8 +21,8 @@ use closecall_campaign::runner::Work;
 use closecall_campaign::session;
 use closecall_report::json::stamped;
 use closecall_scenarios::criteria::{EGO_COLLIDED, EventExpression, Guide, PairFlag, Quantity};
-use closecall_scenarios::library;
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Setting, library};
 use closecall_sensors::SensorMode;
 use closecall_studies::case::Case;
 use closecall_studies::minimize::{MinimizedText, minimize, output_files, write_files};
@@ -383,8 +383,11 @@ fn replay(work: &Work, nearest: &Nearest, sensors: Option<SensorMode>) -> String
         several => format!("--arms {}", quoted(&several.join(","))),
     };
     let sensors = sensors.map_or_else(String::new, |mode| format!(" --sensors {}", mode.name()));
-    let settings: String =
-        work.file.settings().iter().map(|set| format!(" --set {}", quoted(&set.to_string()))).collect();
+    // What a setting has replaced, such as a fitted distribution, is not named.
+    let all = work.file.settings();
+    let is_left = |(index, set): &(usize, &Setting)| !all[index + 1..].iter().any(|later| later.undoes(set));
+    let left = all.iter().enumerate().filter(is_left);
+    let settings: String = left.map(|(_, set)| format!(" --set {}", quoted(&set.to_string()))).collect();
     let varying = work.file.space().varying().filter_map(|(name, _)| {
         let value = nearest.parameters.get(name)?;
         Some(format!(" --set {}", quoted(&format!("{name}={value}"))))

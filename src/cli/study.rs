@@ -237,6 +237,13 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> 
 pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let study = &args.study;
     let file = study.file()?;
+    for (index, Grid { key, .. }) in args.vary.iter().enumerate() {
+        if args.vary[..index].iter().any(|earlier| earlier.key == *key) {
+            return Err(CliError::usage(format!(
+                "--vary {key} is given twice: name all values in one list, {key}=a,b"
+            )));
+        }
+    }
     let grid = if args.vary.is_empty() { FrontierPlan::default_grid(&file) } else { args.vary.clone() };
     let sampling = Sampling { seed: study.seed, design: Design::Random, samples: args.samples };
     let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), Workers::with_jobs(study.jobs));

@@ -476,6 +476,74 @@ fn a_verdict_on_a_controller_from_outside_says_that_its_seed_was_known() {
 }
 
 #[test]
+fn of_two_values_that_contradict_each_other_none_wins_in_silence() {
+    let path = library("low-thw-overtake");
+    let refused = |args: &[&str], named: &[&str]| {
+        let output = closecall(args);
+        let said = message(&output);
+        assert_eq!(code(&output), 2, "{args:?}: {said}");
+        for words in named {
+            assert!(said.contains(words), "{args:?}: {words}: {said}");
+        }
+    };
+    let campaign = ["campaign", path.to_str().unwrap(), "-n", "2", "--sensors", "ground-truth"];
+    let with = |more: &[&'static str]| [&campaign[..], more].concat();
+    refused(&with(&["--set", "brake-mps2=5", "--set", "brake-mps2=6"]), &["brake-mps2=5", "brake-mps2=6"]);
+    refused(
+        &with(&["--set", "actor.rear.start.behind.gap-m=90", "--set", "actor.rear.start={behind={gap-m=120}}"]),
+        &["gap-m=90", "gap-m=120"],
+    );
+    let arms = ["--arms", "acc,mis", "--set", "acc:aeb.trigger-mps2=5", "--set"];
+    refused(&with(&[&arms[..], &["acc:aeb.trigger-mps2=6"]].concat()), &["trigger-mps2=5", "trigger-mps2=6"]);
+    // The same value by its whole path, and within the name of the controller.
+    let whole = "acc:actor.ego.driver.ego-stack.aeb.trigger-mps2=6";
+    refused(&with(&[&arms[..], &[whole]].concat()), &["trigger-mps2=5", "trigger-mps2=6"]);
+    let twice = "acc+aeb:aeb.trigger-mps2=5:aeb.trigger-mps2=6";
+    refused(&with(&["--controller", twice]), &["trigger-mps2=5", "trigger-mps2=6"]);
+    let gates = ["--gate", "count(ego_collided) <= 100"];
+    refused(&with(&[&gates[..], &["--gate", "count(ego_collided) <= 0"]].concat()), &["<= 100", "<= 0"]);
+    refused(&with(&[&gates[..], &["--max-collisions", "0"]].concat()), &["<= 100", "<= 0"]);
+    refused(
+        &["run", path.to_str().unwrap(), "--set", "brake-mps2=5", "--set", "brake-mps2=6"],
+        &["brake-mps2=5", "brake-mps2=6"],
+    );
+    let frontier = ["study", "frontier", path.to_str().unwrap(), "--vary", "brake-mps2=5,6", "--vary"];
+    refused(&[&frontier[..], &["brake-mps2=7"]].concat(), &["--vary brake-mps2 is given twice"]);
+    // A file whose gates contradict each other.
+    let folder = folder();
+    let text = "[gate]\nrequire = ['count(ego_collided) <= 100', 'count(ego_collided) <= 0']\n";
+    let own = scenario(folder.path(), &headline_with("[[actor]]", &format!("{text}\n[[actor]]")));
+    refused_by_file(&own);
+    // What does not contradict: one value twice, both sides of a range, and a value of one arm.
+    let fits = [
+        "--set",
+        "brake-mps2=5",
+        "--set",
+        "brake-mps2=5",
+        "--gate",
+        "share(engaged) >= 0",
+        "--gate",
+        "share(engaged) <= 1",
+        "--arms",
+        "acc,mis",
+        "--set",
+        "actor.ego.driver.ego-stack.acc.time-gap-s=1.5",
+        "--set",
+        "acc:acc.time-gap-s=1.6",
+    ];
+    let output = closecall(with(&fits));
+    assert!([0, 1, 4].contains(&code(&output)), "{}", stderr(&output));
+}
+
+/// Checks that a scenario file with two contradictory gates is refused.
+fn refused_by_file(path: &Path) {
+    let output = closecall(["check", path.to_str().unwrap()]);
+    let said = message(&output);
+    assert_eq!(code(&output), 3, "{said}");
+    assert!(said.contains("`gate.require`") && said.contains("<= 100") && said.contains("<= 0"), "{said}");
+}
+
+#[test]
 fn a_twin_finds_what_the_system_induces_where_nothing_happens() {
     let path = library("rear-vehicle-is-followed-without-brake");
     let args = ["-n", "400", "--seed", "46", "--paired", "--sensors", "object"];

@@ -24,6 +24,15 @@ pub enum AssemblyError {
         /// The criterion.
         expression: Box<Expression>,
     },
+    /// Two criteria of the command line bound the same value on the same side: one would hide the
+    /// other.
+    #[error("the gates `{first}` and `{second}` contradict each other: give one of them")]
+    Contradiction {
+        /// The first criterion.
+        first: Box<Expression>,
+        /// The second criterion.
+        second: Box<Expression>,
+    },
     /// A gate on a probability needs independent samples.
     #[error(
         "a gate on the probability of a collision needs independent samples: the design `random` draws them, and `{design}` does not"
@@ -56,6 +65,9 @@ impl GateSet {
         is_paired: bool,
         design: Design,
     ) -> Result<(), AssemblyError> {
+        if let Some([first, second]) = Expression::contradiction(&command_line) {
+            return Err(AssemblyError::Contradiction { first: Box::new(first), second: Box::new(second) });
+        }
         for expression in command_line {
             if expression.needs_pairs() && !is_paired {
                 return Err(AssemblyError::NoBaseline { expression: Box::new(expression) });

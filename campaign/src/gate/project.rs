@@ -4,7 +4,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::criteria::GateConfig;
+use closecall_scenarios::criteria::{Expression, GateConfig};
 use closecall_scenarios::source::PROJECT_FILE;
 use closecall_traffic::input::read_text;
 use serde::Deserialize;
@@ -43,7 +43,8 @@ impl ProjectFile {
     /// there is none.
     ///
     /// # Errors
-    /// [`ProjectError`] if the file cannot be read, or has an unknown key or an invalid criterion.
+    /// [`ProjectError`] if the file cannot be read, has an unknown key or an invalid criterion, or two
+    /// criteria that contradict each other.
     pub fn find(folder: &Path) -> Result<Option<Self>, ProjectError> {
         for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
             // A file that cannot be read may hold gates: they must not be left out. A link that leads
@@ -68,6 +69,9 @@ impl ProjectFile {
         let fail = |message: String, is_io| ProjectError { path: path.to_owned(), message, is_io };
         let text = read_text(path).map_err(|error| fail(error.to_string(), error.kind() != ErrorKind::InvalidData))?;
         let config: ProjectConfig = toml::from_str(&text).map_err(|error| fail(error.to_string(), false))?;
+        if let Some([first, second]) = Expression::contradiction(&config.gate.require) {
+            return Err(fail(format!("`gate.require`: `{first}` and `{second}` contradict each other"), false));
+        }
         Ok(Self { path: path.to_owned(), gate: config.gate })
     }
 
@@ -94,10 +98,7 @@ impl ProjectFile {
     pub fn add_to(self, set: &mut GateSet) -> Result<(), ProjectError> {
         let source = GateSource::ProjectFile(self.path.clone());
         for expression in self.gate.require {
-            let is_replaced = set.specs.iter().any(|spec| spec.expression.subject() == expression.subject());
-            if !is_replaced {
-                set.push(GateSpec { expression, source: source.clone() });
-            }
+            set.push(GateSpec { expression, source: source.clone() });
         }
         if let (None, Some(max)) = (&set.probability, self.gate.max_probability) {
             let confidence = self.gate.confidence.unwrap_or(ProbabilityGate::CONFIDENCE);
@@ -127,6 +128,25 @@ mod tests {
         ProjectFile::find(&below).unwrap().unwrap().add_to(&mut set).unwrap();
         let gates: Vec<String> = set.specs.iter().map(|spec| spec.expression.to_string()).collect();
         assert_eq!(gates, ["count(ego_collided) <= 5", "max(max_jerk_mps3) <= 3"]);
+    }
+
+    #[test]
+    fn both_sides_of_a_range_are_judged_and_contradictory_bounds_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |text: &str| std::fs::write(root.path().join(PROJECT_FILE), text).unwrap();
+        write("[gate]\nrequire = ['share(engaged) >= 0.1', 'share(engaged) <= 0.5']\n");
+        let gates_beside = |command_line: &str| {
+            let mut set = GateSet::of([command_line.parse().unwrap()]);
+            ProjectFile::find(root.path()).unwrap().unwrap().add_to(&mut set).unwrap();
+            set.specs.iter().map(|spec| spec.expression.to_string()).collect::<Vec<_>>()
+        };
+        let range = ["share(engaged) >= 0.1", "share(engaged) <= 0.5"];
+        assert_eq!(gates_beside("count(induced) <= 0"), [&["count(induced) <= 0"], &range[..]].concat());
+        // A gate of the command line replaces the one on its side.
+        assert_eq!(gates_beside("share(engaged) <= 0.9"), ["share(engaged) <= 0.9", range[0]]);
+        write("[gate]\nrequire = ['share(engaged) <= 0.9', 'share(engaged) <= 0.5']\n");
+        let message = ProjectFile::find(root.path()).unwrap_err().message;
+        assert!(message.contains("<= 0.9") && message.contains("<= 0.5"), "{message}");
     }
 
     #[cfg(unix)]

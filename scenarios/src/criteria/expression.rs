@@ -188,6 +188,19 @@ impl Expression {
         [reports(true), reports(false)]
     }
 
+    /// Returns the first two gates that contradict each other: they bound the same value on the same
+    /// side, with different bounds.
+    pub fn contradiction(gates: &[Self]) -> Option<[Self; 2]> {
+        gates.iter().enumerate().find_map(|(index, later)| {
+            let is_other = |earlier: &&Self| {
+                earlier.operator == later.operator
+                    && earlier.bound != later.bound
+                    && earlier.subject() == later.subject()
+            };
+            Some([*gates[..index].iter().find(is_other)?, *later])
+        })
+    }
+
     /// Returns the left-hand side, which identifies the judged quantity.
     pub fn subject(&self) -> String {
         let condition = self.condition.map_or_else(String::new, |condition| format!(" | {condition}"));

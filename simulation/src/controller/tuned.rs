@@ -29,7 +29,7 @@ pub struct Tuned {
 
 /// A setting that an arm cannot have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{setting}` is no setting of the ego stack: {problem}")]
+#[error("`{setting}` cannot be set in an arm: {problem}")]
 pub struct TunedError {
     /// The setting.
     pub setting: String,
@@ -39,10 +39,11 @@ pub struct TunedError {
 
 impl Tuned {
     /// Returns the controller with one more setting, which is below the ego stack, or below the
-    /// whole scenario. It replaces one of the same key.
+    /// whole scenario.
     ///
     /// # Errors
-    /// [`TunedError`] if the ego stack has no such key, or the value is out of range.
+    /// [`TunedError`] if the ego stack has no such key, the value is out of range, or the key has
+    /// another value already.
     pub fn with(mut self, setting: &str) -> Result<Self, TunedError> {
         let fail = |problem: String| TunedError { setting: setting.to_owned(), problem };
         let Some((key, value)) = setting.split_once('=') else {
@@ -54,9 +55,13 @@ impl Tuned {
             all => all,
         };
         let key = below.join(".");
-        let is_other = |setting: &String| setting.split_once('=').is_none_or(|(other, _)| other != key);
-        self.settings.retain(is_other);
-        self.settings.push(format!("{key}={}", value.trim()));
+        let wanted = format!("{key}={}", value.trim());
+        let is_same_key = |setting: &&String| setting.split_once('=').is_some_and(|(other, _)| other == key);
+        match self.settings.iter().find(is_same_key) {
+            Some(present) if *present == wanted => return Ok(self),
+            Some(present) => return Err(fail(format!("`{present}` is set already: give one of them"))),
+            None => self.settings.push(wanted),
+        }
         self.patch().map_err(fail)?;
         Ok(self)
     }
@@ -101,8 +106,11 @@ mod tests {
         assert_eq!(tuned.to_string(), "acc:aeb.trigger-mps2=5");
         let same = Tuned::new(BuiltIn::Acc).with("actor.ego.driver.ego-stack.aeb.trigger-mps2 = 5").unwrap();
         assert_eq!(same, tuned);
-        let replaced = tuned.with("aeb.trigger-mps2=6").unwrap().with("acc.time-gap-s=1.5").unwrap();
-        assert_eq!(replaced.to_string(), "acc:aeb.trigger-mps2=6:acc.time-gap-s=1.5");
+        let more = tuned.with("aeb.trigger-mps2=5").unwrap().with("acc.time-gap-s=1.5").unwrap();
+        assert_eq!(more.to_string(), "acc:aeb.trigger-mps2=5:acc.time-gap-s=1.5");
+        // Neither value may win in silence.
+        let refused = more.with("actor.ego.driver.ego-stack.aeb.trigger-mps2=6").unwrap_err().to_string();
+        assert!(refused.contains("=6") && refused.contains("`aeb.trigger-mps2=5` is set already"), "{refused}");
     }
 
     #[test]
