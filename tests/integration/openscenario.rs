@@ -517,6 +517,51 @@ fn an_action_ends_with_its_event_so_that_a_condition_sees_it() {
     assert!((time_of(&said, "brake begins") - 7.5).abs() <= 0.021, "{said}");
 }
 
+/// A scenario with a second act, in which the truck slows down from 4 s on. Its manoeuvre has
+/// the name of the first act's. The first act stops at 5 s, within the lane change.
+fn with_two_acts() -> String {
+    let trigger = |kind: &str, name: &str, time_s: u32| {
+        format!(
+            "<{kind}><ConditionGroup><Condition name=\"{name}\" delay=\"0\" conditionEdge=\"none\"><ByValueCondition>\
+             <SimulationTimeCondition value=\"{time_s}\" rule=\"greaterOrEqual\"/></ByValueCondition></Condition>\
+             </ConditionGroup></{kind}>"
+        )
+    };
+    let action = "<PrivateAction><LongitudinalAction><SpeedAction>\
+                  <SpeedActionDynamics dynamicsShape=\"linear\" value=\"8\" dynamicsDimension=\"time\"/>\
+                  <SpeedActionTarget><AbsoluteTargetSpeed value=\"12\"/></SpeedActionTarget>\
+                  </SpeedAction></LongitudinalAction></PrivateAction>";
+    let second = format!(
+        "<Act name=\"second\"><ManeuverGroup name=\"slower\" maximumExecutionCount=\"1\">\
+         <Actors selectTriggeringEntities=\"false\"><EntityRef entityRef=\"Slow_Truck\"/></Actors>\
+         <Maneuver name=\"maneuver\"><Event name=\"slow-down\" priority=\"overwrite\" maximumExecutionCount=\"1\">\
+         <Action name=\"slow-down-action\">{action}</Action>{}</Event></Maneuver></ManeuverGroup>{}</Act>",
+        trigger("StartTrigger", "slow", 4),
+        trigger("StartTrigger", "second-begins", 0)
+    );
+    let text = SCENARIO.replacen("      </Act>", &format!("{}</Act>{second}", trigger("StopTrigger", "stop", 5)), 1);
+    assert!(text != SCENARIO);
+    text
+}
+
+#[test]
+fn the_stop_trigger_of_an_act_ends_the_events_of_that_act_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let said = stdout(&imported(&written(folder.path(), &with_two_acts(), ROAD), &output, &[]), 0);
+    // An event that overwrites those of its manoeuvre does not touch a manoeuvre of the same name.
+    assert!((time_of(&said, "slow-down begins") - 4.0).abs() <= 0.011, "{said}");
+    assert!((time_of(&said, "cut-in ends") - 5.0).abs() <= 0.021, "{said}");
+    assert!(said.contains("`cut-in` ends at 5.00 s within its lane change"), "{said}");
+    assert!(!said.contains("brake begins"), "the act of this event has stopped: {said}");
+    assert!((time_of(&said, "slow-down ends") - 12.0).abs() <= 0.021, "{said}");
+    let text = fs::read_to_string(&output).unwrap();
+    let scenario: toml::Table = toml::from_str(&text).unwrap();
+    let profile = scenario["actor"][1]["driver"]["prescribed"]["profile"].as_array().unwrap();
+    let lowest = profile.iter().map(|point| point[1].as_float().unwrap()).fold(f64::INFINITY, f64::min);
+    assert!((lowest - 12.0).abs() < 1e-6, "{text}");
+}
+
 #[test]
 fn thousands_of_parameters_do_not_slow_the_storyboard() {
     let folder = tempfile::tempdir().unwrap();

@@ -83,7 +83,8 @@ enum Running {
 #[derive(Clone, Debug)]
 struct RunningEvent {
     name: String,
-    maneuver: String,
+    /// The number of its manoeuvre in the document. Two acts may have manoeuvres of one name.
+    maneuver: usize,
     is_longitudinal: Vec<usize>,
     /// The names of its actions. Each ends with the event.
     names: Vec<String>,
@@ -221,7 +222,7 @@ impl<'a> Storyboard<'a> {
         if let Some(stop) = act.child("StopTrigger").filter(|trigger| !trigger.children.is_empty())
             && self.is_triggered(Some(stop))?
         {
-            self.running.clear();
+            self.stop_act(act);
             self.end(&name);
             return Ok(());
         }
@@ -241,6 +242,15 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
+    /// Ends the manoeuvres and the events of an act. Those of other acts go on.
+    fn stop_act(&mut self, act: &Node) {
+        let maneuvers: Vec<&Node> = act.all("ManeuverGroup").flat_map(|group| group.all("Maneuver")).collect();
+        self.end_events(|running| maneuvers.iter().any(|maneuver| maneuver.id == running.maneuver));
+        for name in maneuvers.iter().filter_map(|maneuver| maneuver.raw("name")) {
+            self.end(name);
+        }
+    }
+
     fn maneuver(&mut self, maneuver: &Node, actors: &[usize]) -> Result<(), ImportError> {
         let name = maneuver.raw("name").unwrap_or_default().to_owned();
         self.start(&name);
@@ -252,7 +262,7 @@ impl<'a> Storyboard<'a> {
                 // The conditions of an event are looked at until it begins.
                 if self.is_triggered(event.child("StartTrigger"))? {
                     if event.raw("priority") == Some("skip")
-                        && self.running.iter().any(|running| running.maneuver == name)
+                        && self.running.iter().any(|running| running.maneuver == maneuver.id)
                     {
                         let message = "`priority` is `skip`, and another event of the manoeuvre runs when it begins: a \
                                        skipped event is not read";
@@ -261,7 +271,7 @@ impl<'a> Storyboard<'a> {
                     self.done.insert(key);
                     self.start(&event_name);
                     self.events.push((self.time_s, format!("{event_name} begins")));
-                    self.begin(event, (&event_name, &name), actors)?;
+                    self.begin(event, (&event_name, maneuver.id), actors)?;
                 }
             }
             are_done &= self.states.get(&event_name).is_some_and(|state| state.ended_s.is_some());
@@ -272,14 +282,14 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    fn begin(&mut self, event: &Node, (name, maneuver): (&str, &str), actors: &[usize]) -> Result<(), ImportError> {
+    fn begin(&mut self, event: &Node, (name, maneuver): (&str, usize), actors: &[usize]) -> Result<(), ImportError> {
         let priority = self.reader.text(event, "priority")?;
         if matches!(priority.as_str(), "override" | "overwrite") {
             self.end_events(|running| running.maneuver == maneuver);
         }
         let mut running = RunningEvent {
             name: name.to_owned(),
-            maneuver: maneuver.to_owned(),
+            maneuver,
             is_longitudinal: Vec::new(),
             names: Vec::new(),
             actions: Vec::new(),
@@ -606,11 +616,31 @@ impl<'a> Storyboard<'a> {
         self.running = running;
         for event in over {
             self.end(&event.name);
+            event.actions.iter().for_each(|action| self.cut_short(&event.name, action));
             for action in event.names {
                 if let Some(state) = self.states.get_mut(&action).filter(|state| state.ended_s.is_none()) {
                     state.ended_s = Some(self.time_s);
                 }
             }
+        }
+    }
+
+    /// Notes an action that ends before it is done, if the scenario file cannot say so. Lane changes
+    /// of a trajectory that have not begun do not happen.
+    fn cut_short(&mut self, event: &str, action: &Running) {
+        let time_s = self.time_s;
+        match *action {
+            Running::Lane { ends_s } if time_s < ends_s - SAME => self
+                .notes
+                .push(format!("`{event}` ends at {time_s:.2} s within its lane change, which is made to its end")),
+            Running::Follow(Following { vehicle, .. }) => self.notes.push(format!(
+                "`{event}` ends at {time_s:.2} s, and `{}` goes on to keep its distance",
+                self.vehicles[vehicle].name
+            )),
+            Running::LaneFrom { vehicle, at_s, .. } => {
+                self.lane_changes.retain(|change| change.vehicle != vehicle || change.at_s != at_s);
+            }
+            _ => {}
         }
     }
 
