@@ -43,5 +43,8 @@ impl Observer for RunObservers<'_> {
         if let Some(tables) = &mut self.tables {
             tables.event(time, event);
         }
+        if let Some(osi) = &mut self.osi {
+            osi.event(time, event);
+        }
     }
 }

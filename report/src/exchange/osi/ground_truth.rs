@@ -11,7 +11,7 @@ use closecall_recorded::osi::{
 use closecall_scenarios::Scenario;
 use closecall_traffic::{Environment, Indicator, Lane, Light, Road, Time, Vehicle, VehicleClass, VehicleState, maths};
 
-use super::recorder::Step;
+use super::recorder::{Moving, Step};
 
 /// The version of the messages.
 pub(super) const VERSION: [u32; 3] = [3, 8, 0];
@@ -66,14 +66,14 @@ fn wrapped(angle_rad: f64) -> f64 {
 /// Returns the message of a step. `range_m` is the part of the road that the lanes cover.
 pub(super) fn ground_truth(scenario: &Scenario, step: &Step, range_m: Option<[f64; 2]>, map: &str) -> GroundTruth {
     let vehicles = scenario.actors.iter().map(|actor| &actor.vehicle);
-    let moving = vehicles.zip(&step.states).zip(&step.pitches_rad).zip(0..);
+    let moving = vehicles.zip(&step.vehicles).zip(0..);
     let (lane, lane_boundary) = range_m.map(|range_m| lanes(scenario, step, range_m)).unwrap_or_default();
     GroundTruth {
         version: Some(version()),
         timestamp: Some(timestamp(step.time)),
         host_vehicle_id: Some(vehicle_id(scenario.ego)),
         moving_object: moving
-            .map(|(((vehicle, state), &pitch_rad), index)| moving_object(scenario, index, vehicle, (state, pitch_rad)))
+            .map(|((vehicle, moving), index)| moving_object(scenario, index, vehicle, moving))
             .collect(),
         lane_boundary,
         lane,
@@ -83,10 +83,10 @@ pub(super) fn ground_truth(scenario: &Scenario, step: &Step, range_m: Option<[f6
 }
 
 /// Returns position and motion of a vehicle in the plane.
-pub(super) fn base(road: &Road, vehicle: &Vehicle, (state, pitch_rad): (&VehicleState, f64)) -> BaseMoving {
+pub(super) fn base(road: &Road, vehicle: &Vehicle, moving: &Moving) -> BaseMoving {
+    let Moving { state, pitch_rad, acceleration_mps2: [along_mps2, left_mps2] } = *moving;
     let pose = road.plane_pose(state.s_m, state.d_m, state.heading_rad);
     let (sin, cos) = maths::sin_cos(pose.yaw_rad);
-    let lateral_mps2 = state.speed_mps * state.yaw_rate_radps;
     let size = vehicle.dimensions;
     BaseMoving {
         dimension: Some(Dimension3d {
@@ -97,23 +97,19 @@ pub(super) fn base(road: &Road, vehicle: &Vehicle, (state, pitch_rad): (&Vehicle
         position: Some(vector(pose.x_m, pose.y_m, 0.5 * size.height_m)),
         orientation: Some(orientation(pitch_rad, pose.yaw_rad)),
         velocity: Some(vector(state.speed_mps * cos, state.speed_mps * sin, 0.0)),
-        acceleration: Some(vector(
-            state.acceleration_mps2 * cos - lateral_mps2 * sin,
-            state.acceleration_mps2 * sin + lateral_mps2 * cos,
-            0.0,
-        )),
+        acceleration: Some(vector(along_mps2 * cos - left_mps2 * sin, along_mps2 * sin + left_mps2 * cos, 0.0)),
         orientation_rate: Some(Orientation3d { roll: Some(0.0), pitch: Some(0.0), yaw: Some(state.yaw_rate_radps) }),
     }
 }
 
-fn moving_object(scenario: &Scenario, index: usize, vehicle: &Vehicle, moves: (&VehicleState, f64)) -> MovingObject {
+fn moving_object(scenario: &Scenario, index: usize, vehicle: &Vehicle, moving: &Moving) -> MovingObject {
     const TYPE_VEHICLE: i32 = 2;
-    let lane = lane_id(scenario.road.lane_at(moves.0.d_m));
+    let lane = lane_id(scenario.road.lane_at(moving.state.d_m));
     let half_m = 0.5 * vehicle.dimensions.wheelbase_m();
     let down_m = WHEEL_RADIUS_M - 0.5 * vehicle.dimensions.height_m;
     MovingObject {
         id: Some(vehicle_id(index)),
-        base: Some(base(&scenario.road, vehicle, moves)),
+        base: Some(base(&scenario.road, vehicle, moving)),
         r#type: Some(TYPE_VEHICLE),
         assigned_lane_id: vec![lane.clone()],
         vehicle_attributes: Some(VehicleAttributes {
@@ -121,7 +117,7 @@ fn moving_object(scenario: &Scenario, index: usize, vehicle: &Vehicle, moves: (&
             bbcenter_to_rear: Some(vector(-half_m, 0.0, down_m)),
             bbcenter_to_front: Some(vector(half_m, 0.0, down_m)),
         }),
-        vehicle_classification: Some(classification(vehicle.class, Some(lights(scenario, moves.0)))),
+        vehicle_classification: Some(classification(vehicle.class, Some(lights(scenario, &moving.state)))),
         moving_object_classification: Some(MovingObjectClassification {
             assigned_lane_id: vec![lane],
             assigned_lane_percentage: vec![1.0],
@@ -173,7 +169,7 @@ fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<m
         });
         points.collect()
     };
-    let host = step.states.get(scenario.ego).map(|state| road.lane_at(state.d_m));
+    let host = step.vehicles.get(scenario.ego).map(|moving| road.lane_at(moving.state.d_m));
     let boundary_id = |number: u8| identifier(FIRST_BOUNDARY + u64::from(number));
     let lanes = (1..=road.lanes()).map(|number| {
         let lane = Lane(number);

@@ -17,20 +17,19 @@ const VIRTUAL_SENSOR: u64 = 30_000;
 /// ego's box.
 pub(super) fn sensor_data(scenario: &Scenario, step: &Step) -> SensorData {
     let ego = &scenario.actors[scenario.ego].vehicle;
-    let state = step.states.get(scenario.ego).copied().unwrap_or_default();
-    let pitch_rad = step.pitches_rad.get(scenario.ego).copied().unwrap_or_default();
+    let moving = step.vehicles.get(scenario.ego).copied().unwrap_or_default();
     let latest = step.tracks.iter().map(|track| track.time).max().unwrap_or(step.time);
     SensorData {
         version: Some(version()),
         timestamp: Some(timestamp(step.time)),
-        host_vehicle_location: Some(base(&scenario.road, ego, (&state, pitch_rad))),
+        host_vehicle_location: Some(base(&scenario.road, ego, &moving)),
         sensor_id: Some(identifier(VIRTUAL_SENSOR)),
         mounting_position: Some(MountingPosition {
             position: Some(vector(0.5 * ego.dimensions.wheelbase_m(), 0.0, -WHEEL_RADIUS_M)),
             orientation: Some(orientation(0.0, 0.0)),
         }),
         last_measurement_time: Some(timestamp(latest)),
-        moving_object: step.tracks.iter().map(|track| detected(track, state.speed_mps)).collect(),
+        moving_object: step.tracks.iter().map(|track| detected(track, moving.state.speed_mps)).collect(),
     }
 }
 

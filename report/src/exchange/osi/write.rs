@@ -49,11 +49,11 @@ impl OsiRecorder {
 
     /// Returns the part of the road that the run uses.
     fn used_road(&self) -> UsedRoad<'_> {
-        let driven = self.steps.iter().flat_map(|step| step.states.iter().map(|state| state.s_m));
+        let driven = self.steps.iter().flat_map(|step| step.vehicles.iter().map(|moving| moving.state.s_m));
         UsedRoad::new(&self.scenario.road, driven)
     }
 
-    fn ground_truths(&self) -> Vec<Vec<u8>> {
+    pub(super) fn ground_truths(&self) -> Vec<Vec<u8>> {
         let range_m = self.used_road().range_m();
         let steps = self.steps.iter().enumerate().map(|(index, step)| {
             let range_m = (index == 0 || self.has_lanes_in_each).then_some(range_m);
