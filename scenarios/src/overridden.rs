@@ -6,10 +6,13 @@
 //! and a replay know them as well.
 
 use super::ScenarioConfig;
-use crate::criteria::{Aggregate, Expression, Operator};
+use crate::criteria::{Aggregate, Expression, GateConfig, Operator};
 
 /// The key of the text that names the weakened demands.
 pub(super) const KEY: &str = "overridden";
+
+/// Confidence of the bound of a probability in a file that names none, as of the gate (-).
+const CONFIDENCE: f64 = 0.95;
 
 /// Returns what `after` demands less than `before`.
 pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
@@ -19,6 +22,9 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
         let is_kept = |old: &Expression| kept.iter().any(|new| is_as_strict(new, old));
         found.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
     }
+    let is_gate_kept = |old: &&Expression| after.gate.require.iter().any(|new| is_as_strict(new, old));
+    found.extend(before.gate.require.iter().filter(|old| !is_gate_kept(old)).map(|old| format!("gate {old}")));
+    found.extend(weaker_probability(&before.gate, &after.gate));
     let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
     found.extend(requirements.map(|mark| format!("requirement {mark}")));
     let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
@@ -26,7 +32,8 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
     found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
-    let asks_coverage = before.checks.values().flatten().any(|check| check.aggregate == Aggregate::Coverage);
+    let mut asked = before.checks.values().flatten().chain(&before.gate.require);
+    let asks_coverage = asked.any(|check| check.aggregate == Aggregate::Coverage);
     found.extend((asks_coverage && before.coverage != after.coverage).then(|| "what is to be covered".to_owned()));
     let observed = before.parameters.0.iter().filter(|(name, parameter)| {
         let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
@@ -34,6 +41,15 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     });
     found.extend(observed.map(|(name, _)| format!("observed range of {name}")));
     found
+}
+
+/// Returns the bound of the probability of a collision if `after` bounds it less, or with less
+/// confidence.
+fn weaker_probability(before: &GateConfig, after: &GateConfig) -> Option<String> {
+    let max = before.max_probability?;
+    let confidence = |gate: &GateConfig| gate.confidence.unwrap_or(CONFIDENCE);
+    let is_kept = after.max_probability.is_some_and(|new| new <= max) && confidence(after) >= confidence(before);
+    (!is_kept).then(|| format!("gate max-probability {max}"))
 }
 
 fn is_as_strict(new: &Expression, old: &Expression) -> bool {
@@ -75,6 +91,29 @@ mod tests {
         ] {
             let weakenings = overridden(&[setting]);
             assert!(weakenings.iter().any(|weakening| weakening.starts_with(part)), "{setting}: {weakenings:?}");
+        }
+    }
+
+    #[test]
+    fn a_gate_of_the_file_that_a_setting_weakens_is_named() {
+        let overridden = |setting: &str| {
+            let gate = "[gate]\nrequire = ['count(ego_collided) <= 0']\nmax-probability = 0.01\n\n[parameters]";
+            let text = library::text("low-thw-overtake").unwrap().replacen("[parameters]", gate, 1);
+            let file = ScenarioFile::parse(Path::new("a.toml"), &text, &[setting.parse().unwrap()]).unwrap();
+            file.config().overridden.clone()
+        };
+        let (count, probability) = ("gate count(ego_collided) <= 0", "gate max-probability 0.01");
+        for (setting, expected) in [
+            ("gate={}", &[count, probability][..]),
+            ("gate.require=[]", &[count][..]),
+            ("gate.require=['count(ego_collided) <= 60']", &[count][..]),
+            ("gate.max-probability=0.1", &[probability][..]),
+            ("gate.confidence=0.6", &[probability][..]),
+            ("gate.max-probability=0.001", &[][..]),
+            ("gate.confidence=0.99", &[][..]),
+            ("duration-s=30", &[][..]),
+        ] {
+            assert_eq!(overridden(setting), expected, "{setting}");
         }
     }
 
