@@ -57,8 +57,8 @@ impl Tuned {
         let key = below.join(".");
         let wanted = format!("{key}={}", value.trim());
         let is_same_key = |setting: &&String| setting.split_once('=').is_some_and(|(other, _)| other == key);
-        match self.settings.iter().find(is_same_key) {
-            Some(present) if *present == wanted => return Ok(self),
+        match self.settings.iter().find(is_same_key).cloned() {
+            Some(present) if present == wanted => return Ok(self),
             Some(present) => return Err(fail(format!("`{present}` is set already: give one of them"))),
             None => self.settings.push(wanted),
         }
