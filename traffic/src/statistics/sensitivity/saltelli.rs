@@ -193,7 +193,9 @@ impl Design {
         let range = [if is_positive { 0.0 } else { f64::NEG_INFINITY }, if is_event { 1.0 } else { f64::INFINITY }];
         let bounded = |quarter: usize| mean(quarter).map(|mean| mean.within(range));
         let means = [bounded(0)?, bounded(1)?, bounded(2)?, bounded(3)?];
-        Some(MainEffect { index: jackknife(&replicates, share_between)?, means })
+        let squares: f64 = replicates.iter().flat_map(|sums| sums.chunks_exact(3)).map(|quarter| quarter[2]).sum();
+        let index = jackknife(&replicates, |sums| share_between(sums, rounding_error(squares)))?;
+        Some(MainEffect { index, means })
     }
 }
 
@@ -221,7 +223,9 @@ impl GroupSums {
     }
 
     fn indices(&self, is_event: bool) -> Indices {
-        let share_of = |part: usize| jackknife(&self.replicates, |sums| Some(sums[part] / sums[0] / variance(sums)?));
+        let error = rounding_error(self.all()[2]);
+        let share_of =
+            |part: usize| jackknife(&self.replicates, |sums| Some(sums[part] / sums[0] / variance(sums, error)?));
         let (first, total) = (share_of(3), share_of(4));
         let changes = self.changes.iter().sum();
         let (first, total) = match self.bounds(is_event) {
@@ -240,13 +244,19 @@ impl GroupSums {
     /// a change over twice the variance. For other outputs, nothing is known about the size of
     /// changes that were not seen.
     fn bounds(&self, is_event: bool) -> Option<[f64; 2]> {
+        let all = self.all();
+        let variance = variance(&all, rounding_error(all[2])).filter(|_| is_event)?;
+        let changes = self.changes.iter().sum();
+        Some(clopper_pearson(changes, self.rows, COVERAGE).map(|probability| 0.5 * probability / variance))
+    }
+
+    /// Returns the sums over all replicates.
+    fn all(&self) -> [f64; 5] {
         let mut all = [0.0; 5];
         for replicate in &self.replicates {
             all.iter_mut().zip(replicate).for_each(|(sum, term)| *sum += term);
         }
-        let variance = variance(&all).filter(|_| is_event)?;
-        let changes = self.changes.iter().sum();
-        Some(clopper_pearson(changes, self.rows, COVERAGE).map(|probability| 0.5 * probability / variance))
+        all
     }
 }
 
@@ -254,19 +264,30 @@ fn with(estimate: Option<Estimate>, interval_95: [f64; 2]) -> Option<Estimate> {
     estimate.map(|estimate| estimate.with_interval(interval_95))
 }
 
-/// Returns the variance of the outputs of A and B; `None` if they do not vary.
-fn variance([count, sum, squares, ..]: &[f64; 5]) -> Option<f64> {
-    let variance = squares / (2.0 * count) - (sum / (2.0 * count)).powi(2);
-    (variance > 0.0).then_some(variance)
+/// Returns the largest variance that rounding alone can give outputs without variance.
+/// `sum_of_squares` is the sum over all replicates. The sum of n squares is wrong by at most n ε / 2
+/// of itself, and the mean square therefore by ε / 2 of the sum. The squared mean is wrong by twice
+/// as much (N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, SIAM 2002, section 4.2).
+/// The factor leaves room for the sums that the jackknife subtracts.
+fn rounding_error(sum_of_squares: f64) -> f64 {
+    4.0 * f64::EPSILON * sum_of_squares
 }
 
-/// Returns the share of the variance between the quarters; `None` if there is none. The sums are
-/// the count, the sum and the sum of the squares of each quarter.
-fn share_between(sums: &[f64; 3 * QUARTERS]) -> Option<f64> {
+/// Returns the variance of the outputs of A and B; `None` if they do not vary by more than the
+/// error of rounding.
+fn variance([count, sum, squares, ..]: &[f64; 5], error: f64) -> Option<f64> {
+    let variance = squares / (2.0 * count) - (sum / (2.0 * count)).powi(2);
+    (variance > error).then_some(variance)
+}
+
+/// Returns the share of the variance between the quarters; `None` if the outputs do not vary by
+/// more than the error of rounding. The sums are the count, the sum and the sum of the squares of
+/// each quarter.
+fn share_between(sums: &[f64; 3 * QUARTERS], error: f64) -> Option<f64> {
     let quarters = || sums.chunks_exact(3).filter(|quarter| quarter[0] > 0.0);
     let total = |part: usize| quarters().map(|quarter| quarter[part]).sum::<f64>();
     let (count, mean) = (total(0), total(1) / total(0));
     let variance = total(2) / count - mean * mean;
     let between: f64 = quarters().map(|quarter| quarter[0] * (quarter[1] / quarter[0] - mean).powi(2)).sum();
-    (variance > 0.0).then(|| between / count / variance)
+    (variance > error).then(|| between / count / variance)
 }

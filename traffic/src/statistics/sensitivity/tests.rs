@@ -117,6 +117,30 @@ fn a_missing_output_leaves_out_its_row_and_a_constant_output_has_no_index() {
 }
 
 #[test]
+fn outputs_that_differ_by_rounding_alone_have_no_index() {
+    // The mixed points alone have the event: A and B have no variance, and their squares less the
+    // squared mean are about 1e-20.
+    let (design, outputs) = design(event, 4, one_by_one(4));
+    let mixed_alone: Vec<_> = (0..outputs.len()).map(|index| Some(f64::from(u8::from(index % 6 > 1)))).collect();
+    let seldom: Vec<_> = (0..outputs.len()).map(|index| Some(f64::from(u8::from(index % 600 == 3)))).collect();
+    for outputs in [mixed_alone, seldom] {
+        let indices = design.indices(&outputs);
+        assert!(indices.iter().all(|index| index.first.is_none() && index.total.is_none()), "{indices:?}");
+    }
+    // The sum of equal outputs is rounded.
+    for output in [0.1, 0.3, 36.7, 1e9 / 3.0] {
+        let constant = vec![Some(output); outputs.len()];
+        assert_eq!(design.main_effect(0, &constant), None, "{output}");
+        let indices = design.indices(&constant);
+        assert!(indices.iter().all(|index| index.first.is_none() && index.total.is_none()), "{output}: {indices:?}");
+    }
+    // Two events in the points A and B of two replicates are a variance, however seldom they are.
+    let mut two = vec![Some(0.0); outputs.len()];
+    (two[0], two[outputs.len() / 2 + 1]) = (Some(1.0), Some(1.0));
+    assert!(design.indices(&two)[0].total.is_some_and(|total| total.value <= 1.0 + 1e-9));
+}
+
+#[test]
 fn the_main_effect_of_a_factor_equals_the_true_effect() {
     // The event needs the first factor below 0.3, the others below 0.6 and 0.9.
     let truth = [0.54, 0.2 * 0.54, 0.0, 0.0];
