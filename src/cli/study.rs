@@ -63,7 +63,7 @@ pub(super) struct StudyArgs {
 #[command(after_help = examples([
     "closecall study sensitivity low-thw-overtake",
     "closecall study sensitivity low-thw-overtake --seed 1 --sensors object --out study",
-    "closecall study sensitivity low-thw-overtake --factor environment.friction=0.3..0.9",
+    "closecall study sensitivity low-thw-overtake --factor environment.friction=0.5..0.9",
 ]))]
 pub(super) struct SensitivityArgs {
     #[command(flatten)]

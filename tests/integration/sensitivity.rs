@@ -66,6 +66,17 @@ fn a_campaign_with_the_greatest_assumption_moved_confirms_it() {
 }
 
 #[test]
+fn the_example_of_the_help_that_varies_a_value_of_the_scenario_runs() {
+    let help = stdout(&closecall(["study", "sensitivity", "--help"]), 0);
+    let example = help.lines().find(|line| line.trim_start().starts_with("closecall ") && line.contains("--factor"));
+    let words = shlex::split(example.unwrap()).unwrap();
+    let few = ["--trajectories", "1", "-n", "1", "--sensors", "object", "--format", "json"].map(str::to_owned);
+    let study_json = json(&closecall(words.into_iter().skip(1).chain(few)), 0);
+    let factors = study_json["factors"].as_array().unwrap();
+    assert!(factors.iter().any(|factor| factor["name"] == "environment.friction"), "{factors:?}");
+}
+
+#[test]
 fn a_study_is_the_same_on_any_number_of_threads_and_its_stages_agree() {
     let folder = folder();
     let out = folder.path().join("out");
