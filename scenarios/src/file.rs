@@ -345,14 +345,26 @@ impl ScenarioFile {
     /// one, if a setting has replaced its only use.
     ///
     /// # Errors
-    /// [`ScenarioError::UnusedParameter`] for the first such parameter.
+    /// [`ScenarioError::UnusedParameter`] for the first such parameter. [`ScenarioError::Value`] for
+    /// a value that names no parameter: its name is misspelt, and the parameter is not to blame.
     pub fn refuse_unused(self) -> Result<Self, ScenarioError> {
+        if self.unused.is_some() && self.names_a_missing_parameter() {
+            self.concrete(&self.space.nominal())?;
+        }
         let Some(name) = self.unused else { return Ok(self) };
         let line = locate::line_of(
             &self.text,
             &KeyPath(["parameters", name.as_str()].map(|key| Segment::Key(key.to_owned())).into()),
         );
         Err(ScenarioError::UnusedParameter { path: self.path, line, name })
+    }
+
+    /// Returns whether some value has the form of a parameter's name, and no parameter has this
+    /// name.
+    fn names_a_missing_parameter(&self) -> bool {
+        let Ok(document) = toml::from_str::<toml::Table>(&self.text) else { return false };
+        let names = &self.config.parameters.0;
+        used_parameters(&document).into_iter().any(|used| !names.keys().any(|name| name.as_str() == used))
     }
 
     /// Returns the name of the ego, or `None` if no actor has an ego stack.
@@ -580,6 +592,23 @@ mod tests {
         let file = ScenarioFile::parse(Path::new("a.toml"), text, &[setting]).unwrap();
         let message = file.check().unwrap_err().to_string();
         assert!(message.contains("(with closing-mps = 8.35)") && !message.contains("cut-out-thw-s"), "{message}");
+    }
+
+    #[test]
+    fn a_misspelt_parameter_is_named_where_it_is_used_and_not_where_it_is_defined() {
+        let parse = |from: &str, to: &str| {
+            let text = super::super::library::text("low-thw-overtake").unwrap().replace(from, to);
+            (ScenarioFile::parse(Path::new("a.toml"), &text, &[]).unwrap().refuse_unused().unwrap_err(), text)
+        };
+        let (error, text) = parse("\"$closing-mps\"", "\"$clsing-mps\"");
+        let line = text.lines().position(|line| line.contains("$clsing-mps")).unwrap() + 1;
+        assert_eq!(error.line(), Some(line), "{error}");
+        let message = error.to_string();
+        assert!(message.contains("$clsing-mps") && message.contains("did you mean `closing-mps`?"), "{message}");
+        assert!(!message.contains("unused"), "{message}");
+        // A parameter that nothing resembles is unused.
+        let (error, _) = parse("\"$closing-mps\"", "8.0");
+        assert!(matches!(error, ScenarioError::UnusedParameter { .. }), "{error}");
     }
 
     #[test]
