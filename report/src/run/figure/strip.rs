@@ -5,7 +5,7 @@ use closecall_traffic::{Lane, Measured, VehicleState, maths};
 use super::chart::tick_text;
 use super::colours::colour;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
-use crate::run::film::{Film, Frame};
+use crate::run::film::{Film, Frame, Part};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 const ASPHALT: &str = "#e9eaec";
@@ -24,6 +24,11 @@ const MARK_PX: f64 = 6.0;
 const HEADWAY_PX: f64 = 28.0;
 /// Width of a letter as a share of the font size.
 const LETTER: f64 = 0.6;
+/// Height of a letter above and below the line of writing, as shares of the font size.
+const ASCENT: f64 = 0.8;
+const DESCENT: f64 = 0.25;
+/// Distance between a vehicle's body and its label (px).
+const BESIDE_PX: f64 = 1.0;
 /// Font size of names and headways (px).
 const FONT_SIZE_PX: f64 = 10.0;
 
@@ -60,10 +65,12 @@ pub(super) fn draw(
         if let Some(other) = other {
             strip.outlines(svg, other);
         }
-        strip.gaps(svg);
-        for actor in (0..film.actors.len()).filter(|&actor| film.is_present(actor, frame_index)) {
+        let mut occupied = strip.gaps(svg);
+        let present: Vec<usize> = (0..film.actors.len()).filter(|&actor| film.is_present(actor, frame_index)).collect();
+        for &actor in &present {
             strip.vehicle(svg, actor);
         }
+        strip.labels(svg, &present, &mut occupied);
         if film.worst_collision().is_some_and(|collision| collision.time <= frame.time) {
             strip.impact(svg);
         }
@@ -88,6 +95,11 @@ pub(super) fn scale(svg: &mut Svg, area: Area, reach: Reach) {
 fn marks_m([rear_m, front_m]: Reach) -> impl Iterator<Item = f64> {
     let first = (rear_m / MARK_EVERY_M).ceil();
     (0..).map(move |mark| (first + f64::from(mark)) * MARK_EVERY_M).take_while(move |&mark_m| mark_m <= front_m)
+}
+
+/// Returns true if two areas have a common part.
+fn overlap(one: Area, other: Area) -> bool {
+    one.left < other.right() && other.left < one.right() && one.top < other.bottom() && other.top < one.bottom()
 }
 
 impl Strip<'_> {
@@ -133,15 +145,12 @@ impl Strip<'_> {
         }
     }
 
-    /// Draws the body, the brake light, the indicator, and the name with the speed.
+    /// Draws the body, the brake light and the indicator.
     fn vehicle(&self, svg: &mut Svg, actor: usize) {
-        let (state, film_actor) = (&self.frame.states[actor], &self.film.actors[actor]);
-        let (half_m, side_m) =
-            (0.5 * film_actor.vehicle.dimensions.length_m, 0.5 * film_actor.vehicle.dimensions.width_m);
-        let corner = |[along, across]: [f64; 2]| self.at(state.s_m + along * half_m, state.d_m + across * side_m);
+        let state = &self.frame.states[actor];
         let shape = self.shape(self.film, actor, state);
-        let paint = colour(self.film, actor);
-        svg.polygon(&shape, paint, Stroke::solid("#ffffff", 0.6));
+        svg.polygon(&shape, colour(self.film, actor), Stroke::solid("#ffffff", 0.6));
+        let corner = |along_and_across| self.corner(actor, along_and_across);
         if state.brake_light {
             svg.line(corner([-1.0, -0.9]), corner([-1.0, 0.9]), Stroke::solid(BRAKE, 4.0));
         }
@@ -153,33 +162,80 @@ impl Strip<'_> {
         if let Some(side) = side {
             svg.circle(corner([-1.0, side]), 3.0, INDICATOR);
         }
-        if !self.film.is_main(actor) {
-            return;
-        }
-        // The name of the ego is below its body, and the names of the others are above: a vehicle
-        // beside the ego covers neither. The others' names extend away from the ego, so that the
-        // headway has room.
-        let text = format!("{} {:.1} m/s", self.film.vehicle_label(actor), state.speed_mps);
-        let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
-        let own_m = self.frame.states[self.film.ego].s_m;
-        let (along, anchor) = match state.s_m - own_m {
-            _ if actor == self.film.ego => (0.0, Anchor::Middle),
-            ahead_m if ahead_m > 0.0 => (-1.0, Anchor::Start),
-            _ => (1.0, Anchor::End),
-        };
-        let x = match (corner([along, 0.0])[0], anchor) {
-            (x, Anchor::Start) => x.min(self.area.right() - width),
-            (x, Anchor::End) => x.max(self.area.left + width),
-            (x, Anchor::Middle) => x,
-        };
-        let y = if actor == self.film.ego { corner([0.0, -1.0])[1] + 11.0 } else { corner([0.0, 1.0])[1] - 3.0 };
-        svg.text([x, y], &text, TextStyle { size: FONT_SIZE_PX, colour: paint, anchor });
     }
 
-    /// Draws the gaps in front of and behind the ego with their time headways.
-    fn gaps(&self, svg: &mut Svg) {
+    /// Returns a point of a vehicle in the picture. The coordinates are shares of half the body's
+    /// length and width.
+    fn corner(&self, actor: usize, [along, across]: [f64; 2]) -> [f64; 2] {
+        let (state, size) = (&self.frame.states[actor], &self.film.actors[actor].vehicle.dimensions);
+        self.at(state.s_m + along * 0.5 * size.length_m, state.d_m + across * 0.5 * size.width_m)
+    }
+
+    /// Writes the name and the speed of each main vehicle in the picture. `occupied` has the areas
+    /// of other texts. A label covers no other text, and no body if there is room elsewhere. A
+    /// label without room is left out.
+    fn labels(&self, svg: &mut Svg, present: &[usize], occupied: &mut Vec<Area>) {
+        let bodies: Vec<Area> = present.iter().map(|&actor| self.body(actor)).collect();
+        let rank = |actor: &usize| match self.film.actors[*actor].part {
+            Part::Ego => 0,
+            Part::Lead | Part::Rear => 1,
+            Part::Other(_) | Part::Background => 2,
+        };
+        let is_named = |actor: &usize| self.film.is_main(*actor) && overlap(self.body(*actor), self.area);
+        let mut named: Vec<usize> = present.iter().copied().filter(is_named).collect();
+        named.sort_by_key(rank);
+        for actor in named {
+            let text = format!("{} {:.1} m/s", self.film.vehicle_label(actor), self.frame.states[actor].speed_mps);
+            let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
+            let places = self.places(actor, width);
+            let is_free = |place: &Area| !occupied.iter().any(|other| overlap(*place, *other));
+            let covers_no_body = |place: &Area| !bodies.iter().any(|body| overlap(*place, *body));
+            let mut free = places.into_iter().filter(is_free);
+            let Some(first) = free.next() else { continue };
+            let place = std::iter::once(first).chain(free).find(covers_no_body).unwrap_or(first);
+            let style = TextStyle { size: FONT_SIZE_PX, colour: colour(self.film, actor), anchor: Anchor::Middle };
+            svg.text([place.left + 0.5 * width, place.top + ASCENT * FONT_SIZE_PX], &text, style);
+            occupied.push(place);
+        }
+    }
+
+    /// Returns the places of a label of this width (px) inside the picture, the best first. The
+    /// name of the ego is below its body, and the names of the others are above: a vehicle beside
+    /// the ego covers neither. The others' names extend away from the ego, so that the headway has
+    /// room.
+    fn places(&self, actor: usize, width: f64) -> Vec<Area> {
+        let body = self.body(actor);
+        let height = (ASCENT + DESCENT) * FONT_SIZE_PX;
+        let (above, below) = (body.top - BESIDE_PX - height, body.bottom() + BESIDE_PX);
+        let (from_rear, from_front, centred) =
+            (body.left, body.right() - width, body.left + 0.5 * (body.width - width));
+        let ahead_m = self.frame.states[actor].s_m - self.frame.states[self.film.ego].s_m;
+        let (tops, lefts) = match actor == self.film.ego {
+            true => ([below, above], [centred, from_rear, from_front]),
+            false if ahead_m > 0.0 => ([above, below], [from_rear, centred, from_front]),
+            false => ([above, below], [from_front, centred, from_rear]),
+        };
+        let places = tops.into_iter().flat_map(|top| {
+            lefts.map(|left| {
+                let left = left.min(self.area.right() - width).max(self.area.left);
+                Area { left, top, width, height }
+            })
+        });
+        places.filter(|place| place.top >= self.area.top && place.bottom() <= self.area.bottom()).collect()
+    }
+
+    /// Returns the area of a vehicle's body.
+    fn body(&self, actor: usize) -> Area {
+        let ([left, top], [right, bottom]) = (self.corner(actor, [-1.0, 1.0]), self.corner(actor, [1.0, -1.0]));
+        Area { left, top, width: right - left, height: bottom - top }
+    }
+
+    /// Draws the gaps in front of and behind the ego with their time headways. Returns the areas of
+    /// the headways.
+    fn gaps(&self, svg: &mut Svg) -> Vec<Area> {
         let (ego, margins) = (&self.frame.states[self.film.ego], &self.frame.margins);
         let half_m = 0.5 * self.film.actors[self.film.ego].vehicle.dimensions.length_m;
+        let mut areas = Vec::new();
         let mut draw = |sign: f64, gap_m: Measured, thw_s: Measured| {
             let (Ok(gap_m), Ok(thw_s)) = (gap_m, thw_s) else { return };
             if !(gap_m > 0.0) {
@@ -188,15 +244,22 @@ impl Strip<'_> {
             let colour = if thw_s < CRITICAL_THW_S { CRITICAL } else { SAFE };
             let ends = [half_m, half_m + gap_m].map(|along_m| self.at(ego.s_m + sign * along_m, ego.d_m));
             svg.line(ends[0], ends[1], Stroke::solid(colour, 2.0));
-            if (ends[1][0] - ends[0][0]).abs() < HEADWAY_PX {
+            // A gap may reach beyond the picture.
+            let seen = ends.map(|[x, _]| x.min(self.area.right()).max(self.area.left));
+            if (seen[1] - seen[0]).abs() < HEADWAY_PX {
                 return;
             }
             let style = TextStyle { size: FONT_SIZE_PX, colour, anchor: Anchor::Middle };
-            let middle = [0.5 * (ends[0][0] + ends[1][0]), ends[0][1] - 4.0];
-            svg.text(middle, &format!("{thw_s:.2} s"), style);
+            let [x, y] = [0.5 * (seen[0] + seen[1]), ends[0][1] - 4.0];
+            let text = format!("{thw_s:.2} s");
+            let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
+            let (top, height) = (y - ASCENT * FONT_SIZE_PX, (ASCENT + DESCENT) * FONT_SIZE_PX);
+            areas.push(Area { left: x - 0.5 * width, top, width, height });
+            svg.text([x, y], &text, style);
         };
         draw(1.0, margins.gap_front_m, margins.thw_front_s);
         draw(-1.0, margins.gap_rear_m, margins.thw_rear_s);
+        areas
     }
 
     /// Draws a burst halfway between the two vehicles of the collision.

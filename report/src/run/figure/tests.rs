@@ -85,3 +85,50 @@ fn the_curves_of_a_figure_are_interrupted_where_another_vehicle_begins() {
     assert_eq!(points.len(), film.frames.len() + changes);
     assert!(is_another(Some(1), Some(2)) && !is_another(Some(1), Some(1)) && !is_another(None, Some(1)));
 }
+
+/// The areas of the labels of vehicles in a picture: left, top, right and bottom (px).
+fn label_areas(svg: &str) -> Vec<[f64; 4]> {
+    let number = |line: &str, name: &str| -> f64 {
+        line.split(&format!(" {name}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
+    let labels = svg.lines().filter(|line| line.ends_with(" m/s</text>") && line.contains("text-anchor=\"middle\""));
+    labels
+        .map(|line| {
+            let text = line.split('>').nth(1).unwrap().trim_end_matches("</text");
+            let half = 0.5 * 6.0 * text.chars().count() as f64;
+            let [x, y] = ["x", "y"].map(|name| number(line, name));
+            [x - half, y - 8.0, x + half, y + 2.0]
+        })
+        .collect()
+}
+
+#[test]
+fn labels_of_several_rear_vehicles_cover_each_other_nowhere_and_lie_on_the_road() {
+    for name in ["rear-vehicles-one-after-another", "rear-vehicle-is-followed", "paper-figure"] {
+        let films = films(name, &[ControllerChoice::ACC, ControllerChoice::MIS]);
+        let pictures = [(encounter(&films), [78.0, 742.0]), (still(&films[0]), [10.0, 550.0])];
+        for (svg, [left, right]) in pictures {
+            let areas = label_areas(&svg);
+            assert!(areas.len() > 1, "{name}");
+            for (index, one) in areas.iter().enumerate() {
+                assert!(one[0] > left - 0.1 && one[2] < right + 0.1, "{name}: {one:?}");
+                for other in &areas[index + 1..] {
+                    let is_apart = one[2] <= other[0] || other[2] <= one[0] || one[3] <= other[1] || other[3] <= one[1];
+                    assert!(is_apart, "{name}: {one:?} and {other:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_outside_of_the_picture_has_no_label() {
+    let films = films("rear-vehicles-one-after-another", &[ControllerChoice::MIS]);
+    // At the start, the third vehicle is farther behind than the picture reaches.
+    let film = &films[0];
+    let mut svg = svg::Svg::new([560.0, 330.0]);
+    let area = svg::Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };
+    strip::draw(&mut svg, (film, None), 0, (area, [-65.0, 75.0]));
+    let text = svg.finish();
+    assert!(text.contains(">E ego ") && !text.contains(">third "), "{text}");
+}
