@@ -53,9 +53,11 @@ const AXIS: RGBColor = RGBColor(0x55, 0x5f, 0x6b);
 pub(super) const GRID: RGBColor = RGBColor(0xe3, 0xe7, 0xec);
 /// Shade of cells in which samples collide.
 pub(super) const COLLISIONS: RGBColor = RGBColor(0xd3, 0x54, 0x00);
-const GREY: RGBColor = RGBColor(0xb5, 0xbf, 0xca);
+/// Colour of samples without a collision, and of bars that say little. Its contrast is 3 : 1 or more
+/// on a white sheet, and, with the lightness inverted, on the sheet of a dark page (WCAG 2.2, 1.4.11).
+pub(super) const GREY: RGBColor = RGBColor(0x7d, 0x88, 0x95);
 const BLUE: RGBColor = RGBColor(0x1f, 0x77, 0xb4);
-const ORANGE: RGBColor = RGBColor(0xe6, 0x7e, 0x22);
+const ORANGE: RGBColor = RGBColor(0xde, 0x77, 0x17);
 const RED: RGBColor = RGBColor(0xb0, 0x00, 0x20);
 const NEARLY_BLACK: RGBColor = RGBColor(0x11, 0x11, 0x11);
 
@@ -213,6 +215,44 @@ mod tests {
         assert_eq!(number_text(0.0, 3.0)(&0.5), "0.5");
         assert_eq!(number_text(0.0, 2_000.0)(&1_250.0), "1250");
         assert_eq!(number_text(-0.01, 0.01)(&-0.0), "0");
+    }
+
+    /// The relative luminance of a colour (WCAG 2.2).
+    fn luminance(colour: [f64; 3]) -> f64 {
+        let linear = colour.map(|channel| match channel / 255.0 {
+            dark if dark <= 0.04045 => dark / 12.92,
+            light => maths::exp(2.4 * maths::ln((light + 0.055) / 1.055)),
+        });
+        linear.iter().zip([0.2126, 0.7152, 0.0722]).map(|(channel, weight)| channel * weight).sum()
+    }
+
+    fn contrast(one: [f64; 3], other: [f64; 3]) -> f64 {
+        let [one, other] = [one, other].map(|colour| luminance(colour) + 0.05);
+        one.max(other) / one.min(other)
+    }
+
+    /// The colour behind the style sheet's `invert(1) hue-rotate(180deg)` (Filter Effects Module 1).
+    fn inverted(colour: [f64; 3]) -> [f64; 3] {
+        let from = colour.map(|channel| 255.0 - channel);
+        [[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]].map(|weights: [f64; 3]| {
+            let sum: f64 = weights.iter().zip(from).map(|(weight, channel)| weight * channel).sum();
+            sum.clamp(0.0, 255.0)
+        })
+    }
+
+    #[test]
+    fn the_colour_of_each_fate_stands_out_from_a_white_and_from_a_dark_sheet() {
+        let (white, dark) = ([255.0; 3], [f64::from(0x1c_u8), f64::from(0x22_u8), f64::from(0x28_u8)]);
+        for fate in Fate::ALL {
+            let RGBColor(red, green, blue) = fate_colour(fate);
+            let colour = [red, green, blue].map(f64::from);
+            let contrasts = [contrast(colour, white), contrast(inverted(colour), dark)];
+            assert!(contrasts.iter().all(|contrast| *contrast >= 3.0), "{}: {contrasts:?}", fate.word(true));
+        }
+        // The sheets of the style sheet.
+        let style = include_str!("../campaign/html/style.css");
+        assert!(style.contains("--sheet: #fff;") && style.contains("--sheet: #1c2228;"));
+        assert!(style.contains("filter: invert(1) hue-rotate(180deg)"));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::style::{Canvas, Drawn, GRID, label_text, number_text, svg};
+use super::style::{Canvas, Drawn, GREY, GRID, label_text, number_text, svg};
 
 /// One bar.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,6 @@ const TICKS: usize = 8;
 const MARGIN: f64 = 0.04;
 
 const BAR: RGBColor = RGBColor(0x1f, 0x77, 0xb4);
-const GREY_BAR: RGBColor = RGBColor(0xb5, 0xbf, 0xca);
 
 /// The texts of a chart.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +101,7 @@ fn draw_scale(canvas: &Canvas<'_>, scale: &Range<f64>, bottom_px: i32, name: &st
 
 fn draw_bar(canvas: &Canvas<'_>, bar: &TornadoBar, scale: &Range<f64>, y: i32) -> Drawn {
     let [from, to] = bar.ends.map(|end| x_px(end, scale));
-    let colour = if bar.is_grey { GREY_BAR } else { BAR };
+    let colour = if bar.is_grey { GREY } else { BAR };
     draw_text(canvas, &bar.label, (NAMES_PX, y), HPos::Right, false)?;
     canvas.draw(&Rectangle::new([(from, y - HALF_BAR_PX), (to, y + HALF_BAR_PX)], colour.filled()))?;
     for interval in bar.intervals_95 {

@@ -30,7 +30,7 @@ const column = name => columns().find(one => one.name === name);
 const fateWord = fate => samples.is_paired ? data.fates[fate].pair : data.fates[fate].single;
 const isDark = () => matchMedia('(prefers-color-scheme: dark)').matches && !matchMedia('print').matches;
 // The colours of the report, as far as they differ from the page by a contrast of 3 : 1.
-const CONTRAST = { light: { '#b5bfca': '#8390a0' }, dark: { '#111111': '#f0f3f6', '#b00020': '#ff5c6c', '#1f77b4': '#4a9fe0' } };
+const CONTRAST = { light: {}, dark: { '#111111': '#f0f3f6', '#b00020': '#ff5c6c', '#1f77b4': '#4a9fe0' } };
 const fateColour = fate => CONTRAST[isDark() ? 'dark' : 'light'][data.fates[fate].colour] ?? data.fates[fate].colour;
 
 // The ends of a column, and the bin of each value in it.
