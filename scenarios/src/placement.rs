@@ -221,8 +221,7 @@ impl Placement<'_> {
         if (1..=self.road.lanes()).contains(&lane.0) {
             Ok(self.road.lane_centre_m(lane))
         } else {
-            let problem = Problem::WrongCount { value: lane.0.into(), allowed: "a lane of this road, counted from 1" };
-            Err(ConfigError::new("lane", problem))
+            Err(ConfigError::new("lane", Problem::UnknownLane { value: lane.0, lanes: self.road.lanes() }))
         }
     }
 }

@@ -176,8 +176,7 @@ impl<'a> Block<'a> {
         }
         for (index, lane) in config.lanes.iter().enumerate() {
             if !(1..=road.lanes()).contains(&lane.0) {
-                let allowed = "a lane of this road, counted from 1";
-                let problem = Problem::WrongCount { value: lane.0.into(), allowed };
+                let problem = Problem::UnknownLane { value: lane.0, lanes: road.lanes() };
                 let path = KeyPath(vec![Segment::Key("lanes".to_owned()), Segment::Index(index)]);
                 return Err(ConfigError { path, problem });
             }

@@ -50,7 +50,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
         ("two actors of one name", text("id = \"front\"", "id = \"ego\""), &["ego", "twice"]),
         ("negative count", text("lanes = 3", "lanes = -1"), &["lanes", "whole number"]),
         ("number instead of a table", text("[sensors]", "[sensors]\nrear-lidar = 3\n[unused]"), &["table"]),
-        ("lane beyond the road", text("lane = 2", "lane = 4"), &["lane", "4"]),
+        ("lane beyond the road", text("lane = 2", "lane = 4"), &["lane", "4", "from 1 (leftmost) to 3"]),
         ("no lanes", text("lanes = 3", "lanes = 0"), &["lanes", "0"]),
         (
             "image without pixels",

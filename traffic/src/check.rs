@@ -63,6 +63,14 @@ pub enum Problem {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// The road has no such lane.
+    #[error("is {value}, but a lane of this road, from 1 (leftmost) to {lanes}, is needed")]
+    UnknownLane {
+        /// The lane found.
+        value: u8,
+        /// The number of lanes, which is the number of the rightmost lane.
+        lanes: u8,
+    },
     /// `$name` refers to a parameter that does not exist.
     #[error("names the parameter `${name}`, which [parameters] does not have; it has {known}{}", hint(name.as_str(), known))]
     UnknownParameter {

@@ -100,7 +100,11 @@ fn what_is_wrong_is_named_with_what_is_allowed() {
     for (from, to, expected) in [
         ("vehicles = 30", "vehicels = 30", "did you mean `vehicles`?"),
         ("vehicles = 30", "vehicles = 0", "`traffic[0].vehicles` is 0, but 1 to 200 vehicles"),
-        ("lanes = [1, 2, 3]", "lanes = [1, 4]", "`traffic[0].lanes[1]` is 4, but a lane of this road"),
+        (
+            "lanes = [1, 2, 3]",
+            "lanes = [1, 4]",
+            "`traffic[0].lanes[1]` is 4, but a lane of this road, from 1 (leftmost) to 3, is needed",
+        ),
         ("lanes = [1, 2, 3]", "lanes = []", "`traffic[0].lanes` is missing: at least one lane"),
         ("mean-thw-s = 2.0", "mean-thw-s = 0.5", "`traffic[0].mean-thw-s` contradicts `min-thw-s`"),
         ("mean-thw-s = 2.0", "", "is missing: one of `mean-thw-s` and `density-per-km`"),

@@ -77,6 +77,7 @@ impl Probe {
             let allowed = match source.problem {
                 Problem::OutOfRange { allowed, .. } => allowed.to_string(),
                 Problem::WrongCount { allowed, .. } => allowed.to_owned(),
+                Problem::UnknownLane { .. } => "a lane of this road, counted from 1".to_owned(),
                 _ => return None,
             };
             at.0.starts_with(&source.path.0).then_some(allowed)
