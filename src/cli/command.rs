@@ -210,15 +210,15 @@ pub fn command() -> clap::Command {
 /// Parses the arguments, and returns the command and the shared library of ONNX Runtime.
 fn parse(arguments: &[std::ffi::OsString]) -> Result<(Command, Option<PathBuf>), clap::Error> {
     let mut command = command();
-    let matches = command.try_get_matches_from_mut(arguments).map_err(plain_words)?;
+    let matches = command.try_get_matches_from_mut(arguments).map_err(|error| plain_words(error, arguments))?;
     let onnxruntime = onnxruntime(&matches);
-    let cli = Cli::from_arg_matches(&matches).map_err(|error| plain_words(error.format(&mut command)))?;
+    let cli = Cli::from_arg_matches(&matches).map_err(|error| plain_words(error.format(&mut command), arguments))?;
     Ok((cli.command, onnxruntime))
 }
 
 /// Explains an argument error in plain words: the whole name of a command that belongs to a group,
 /// and the allowed numbers.
-fn plain_words(error: clap::Error) -> clap::Error {
+fn plain_words(error: clap::Error, arguments: &[std::ffi::OsString]) -> clap::Error {
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.as_str()),
         _ => None,
@@ -238,14 +238,27 @@ fn plain_words(error: clap::Error) -> clap::Error {
         }
         kind @ ErrorKind::UnknownArgument => {
             let Some(argument) = text(ContextKind::InvalidArg) else { return error };
-            if argument.parse::<f64>().is_err() {
-                return error;
-            }
-            (kind, format!("unexpected argument '{argument}': the option before it takes no number below 0"))
+            let Some(message) = negative_number(argument, arguments) else { return error };
+            (kind, message)
         }
         _ => return error,
     };
     clap::Error::raw(kind, format!("{message}\n\nFor more information, try '--help'.\n"))
+}
+
+/// Returns the message for a number below 0 where none is allowed. clap takes `-25` for several
+/// options of one letter, and names the first, `-2`.
+fn negative_number(named: &str, arguments: &[std::ffi::OsString]) -> Option<String> {
+    let words: Vec<Cow<'_, str>> = arguments.iter().map(|argument| argument.to_string_lossy()).collect();
+    let is_number = |word: &str| {
+        word.strip_prefix('-')
+            .is_some_and(|rest| rest.starts_with(|first: char| first.is_ascii_digit() || first == '.'))
+    };
+    let at = words.iter().position(|word| word.starts_with(named) && is_number(word))?;
+    let before = words.get(at.checked_sub(1)?)?;
+    let is_option = before.starts_with('-') && before.len() > 1 && !is_number(before);
+    let expected = if is_option { format!("'{before}' takes") } else { "this command takes".to_owned() };
+    Some(format!("unexpected argument '{}': {expected} no number below 0", words[at]))
 }
 
 /// Returns the allowed numbers, if another number is the reason for the error.

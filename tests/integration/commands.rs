@@ -185,7 +185,11 @@ fn a_misspelt_or_negative_value_is_explained() {
         (["run", "paper-figure", "--set", "duration=3"], "did you mean `duration-s`?"),
         (["campaign", "paper-figure", "-n", "-5"], "`-5` is negative: a whole number of 1 or more is needed"),
         (["campaign", "paper-figure", "--samples", "1e3"], "is not a whole number"),
-        (["campaign", "paper-figure", "--max-collisions", "-1"], "the option before it takes no number below 0"),
+        (["campaign", "paper-figure", "--max-collisions", "-1"], "'-1': '--max-collisions' takes no number below 0"),
+        (["run", "paper-figure", "--sample", "-25"], "unexpected argument '-25': '--sample' takes no number below 0"),
+        (["study", "map", "--closing-kmh", "-10,20"], "'-10,20': '--closing-kmh' takes no number below 0"),
+        (["study", "map", "--speed-mps", "-.5"], "'-.5': '--speed-mps' takes no number below 0"),
+        (["explain", "results", "-17", "--quiet"], "unexpected argument '-17': this command takes no number below 0"),
         (["campaign", "paper-figure", "--max-collisions", "many"], "expected a whole number, 0 or more"),
         (
             ["run", "paper-figure", "--sample", "1.5"],
