@@ -14,7 +14,7 @@ use closecall_traffic::atomic::WriteError;
 /// | 1 | fail | a gate is not met: for example more collisions than allowed, or a regression |
 /// | 2 | usage | the command line is wrong |
 /// | 3 | invalid input | a scenario, trajectory file or network cannot be used; nothing was run |
-/// | 4 | inconclusive | there are too few samples for the requested bound |
+/// | 4 | inconclusive | there are too few samples for the requested bound, or nothing was judged |
 /// | 5 | sample error | at least one sample ended in an error |
 /// | 6 | i/o | a file or folder cannot be read or written |
 /// | 7 | invalid | a validity check of the simulator failed |
@@ -31,7 +31,7 @@ pub enum ExitCode {
     Usage = 2,
     /// A scenario, trajectory file or network cannot be used.
     InvalidInput = 3,
-    /// There are too few samples for the requested bound.
+    /// There are too few samples for the requested bound, or nothing was judged.
     Inconclusive = 4,
     /// At least one sample ended in an error.
     SampleError = 5,

@@ -131,7 +131,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 pub fn count(text: &str) -> Result<u64, String> {
     let reason = match text.parse::<i128>() {
         Ok(number) if number > 0 => return u64::try_from(number).map_err(|_| format!("`{text}` is too large")),
-        Ok(0) => "is no sample at all",
+        Ok(0) => "is none",
         Ok(_) => "is negative",
         Err(_) => "is not a whole number",
     };
@@ -253,7 +253,8 @@ mod tests {
     #[test]
     fn a_count_is_a_whole_number_above_zero() {
         assert_eq!(count("200"), Ok(200));
-        for (text, reason) in [("-5", "is negative"), ("0", "no sample"), ("1.5", "not a whole number"), ("", "whole")]
+        for (text, reason) in
+            [("-5", "is negative"), ("0", "`0` is none"), ("1.5", "not a whole number"), ("", "whole")]
         {
             assert!(count(text).unwrap_err().contains(reason), "{text}");
         }

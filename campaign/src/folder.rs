@@ -21,7 +21,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::outcome::Outcome;
-use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, is_temporary, write_file};
 use closecall_traffic::input::read_text;
 
 use super::journal::{self, Entry, Journal};
@@ -136,7 +136,7 @@ impl Folder {
     /// another program.
     pub fn lock(path: &Path, manifest: &Manifest, resume: bool) -> Result<LockedFolder, FolderError> {
         let folder = Self::open(path);
-        fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
+        create_folder(path)?;
         let is_new = folder.is_unused()?;
         let has_manifest = folder.has(MANIFEST)?;
         if !has_manifest && folder.has(rare::MANIFEST)? {

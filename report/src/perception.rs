@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::json::stamped;
 use crate::table::{Column, write_columns};
-use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, write_file};
 use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
@@ -39,7 +39,7 @@ impl Studies {
     /// # Errors
     /// [`WriteError`] if a file cannot be written. An existing file then stays as it is.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, WriteError> {
-        std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+        create_folder(folder)?;
         let names = ["sensors.html", "sensors.json", "sensors.parquet", "curves.parquet", "calibration.parquet"];
         let paths = names.map(|name| folder.join(name));
         let page = page::page(&self.0).into_string();

@@ -169,7 +169,7 @@ fn of_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, Scena
             Some(name) => format!("; did you mean `{name}`?"),
             None => library::suggestion(name),
         };
-        return Err(ScenarioError::Unknown { name: word.to_owned(), suggestion });
+        return Err(ScenarioError::Unknown { name: path.display().to_string(), suggestion });
     }
     Ok(scenario)
 }

@@ -39,7 +39,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Function, ScenarioError, ScenarioFile, Spreads, logical};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::engagement::engagements;
-use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{create_folder, write_file};
 use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
@@ -343,7 +343,7 @@ fn origin(name: &str, path: &Path, (approach, chosen): (&Approach, Relevant)) ->
 impl Companion for Chain {
     fn begin(&mut self, folder: &Folder) -> Result<(), CliError> {
         for path in [SCENARIOS, ENCOUNTERS].map(|name| folder.file(name)) {
-            std::fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
+            create_folder(&path)?;
         }
         for ((index, approach, file), origin) in self.encounters.iter().zip(&mut self.origins.encounters) {
             let (recording, name) = (&self.recordings[*index], &file.config().name);

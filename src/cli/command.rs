@@ -101,7 +101,7 @@ Exit codes:
   1  fail: a gate is not met, for example more collisions than allowed
   2  the command line is wrong
   3  a scenario, trajectory file or network cannot be used; nothing was run
-  4  inconclusive: there are too few samples for the requested bound
+  4  inconclusive: there are too few samples for the requested bound, or nothing was judged
   5  at least one sample ended in an error
   6  a file or folder cannot be read or written
   7  invalid: a validity check of the simulator failed

@@ -6,6 +6,7 @@ use clap::Args;
 use closecall_recorded::trajectory_data::{BadRows, QualityInspector, ReadOptions, TrajectoryFileError, open};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::quality::QualityText;
+use closecall_traffic::words::counted;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, advise_on_lanes};
@@ -55,9 +56,9 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     let path = tracks.path().display();
     let first = dropped.reasons().filter_map(|(_, rows)| Some((rows.first_line?, &rows.first))).min();
     let first = first.map(|(line, message)| format!(", line {line}: {message}")).unwrap_or_default();
-    let count = dropped.count();
+    let unusable = counted(dropped.count(), "row");
     print_error(format_args!(
-        "{path}{first}\n{count} rows cannot be used: other commands refuse the file unless --drop-bad-rows is given\n"
+        "{path}{first}\n{unusable} cannot be used: other commands refuse the file unless --drop-bad-rows is given\n"
     ));
     Ok(ExitCode::InvalidInput)
 }

@@ -56,7 +56,10 @@ pub(super) fn watch(
     args: &WatchingArgs,
 ) -> Result<ExitCode, CliError> {
     let Some(path) = existing(scenario).filter(|path| path.is_file()) else {
-        let message = format!("there is no file {}: `closecall new NAME` writes one", scenario.display());
+        let message = match scenario.is_dir() {
+            true => format!("{} is a folder: --watch is for one scenario file", scenario.display()),
+            false => format!("there is no file {}: `closecall new NAME` writes one", scenario.display()),
+        };
         return Err(CliError::Usage { message });
     };
     let mut last_state = None;

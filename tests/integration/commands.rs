@@ -2,7 +2,9 @@
 //! `tool man`; and the common parts of all commands: their groups and their help, the sources of
 //! scenarios, the statements about the origin of an output, and the answers to misspelt words.
 
+use std::ffi::OsStr;
 use std::io::Write;
+use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::process::Stdio;
 
@@ -209,6 +211,25 @@ fn a_misspelt_or_negative_value_is_explained() {
         let text = message(&output);
         assert!(text.contains(expected) && !text.contains("-- -1") && !text.contains("digit"), "{text}");
     }
+}
+
+#[test]
+fn a_wrong_path_is_named_with_what_it_is() {
+    let folder = folder();
+    let path = folder.path().to_str().unwrap();
+    let file = folder.path().join("results");
+    std::fs::write(&file, "text").unwrap();
+    let watched = closecall(["check", path, "--watch", "--rounds", "1"]);
+    assert_eq!(code(&watched), 2);
+    assert!(message(&watched).contains(&format!("{path} is a folder: --watch is for one scenario file")));
+    let written = closecall(["campaign", "paper-figure", "-n", "1", "--no-gate", "--out", file.to_str().unwrap()]);
+    assert_eq!(code(&written), 6);
+    assert!(message(&written).contains("results: it is a file, and a folder is needed"), "{}", message(&written));
+    let odd = closecall([OsStr::new("run"), OsStr::from_bytes(b"nope\xff")]);
+    assert_eq!(code(&odd), 2);
+    assert!(message(&odd).contains("there is no scenario `nope\u{fffd}`"), "{}", message(&odd));
+    let none = stderr(&closecall(["tool", "render", "-n", "0", "--out", path]));
+    assert!(none.contains("`0` is none: a whole number of 1 or more is needed"), "{none}");
 }
 
 #[test]

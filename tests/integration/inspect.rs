@@ -24,7 +24,7 @@ fn flaws_are_reported_and_unusable_rows_end_with_3() {
     fs::write(csv, lines.join("\n") + "\n").unwrap();
     let output = closecall(["traffic", "inspect", csv, "--format", "json"]);
     assert!(stderr(&output).contains("own.csv, line 101: frame 98"), "{}", stderr(&output));
-    assert!(stderr(&output).contains("1 rows cannot be used"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("1 row cannot be used"), "{}", stderr(&output));
     let report = json(&output, 3);
     assert_eq!(report["dropped"]["duplicated rows"]["first_line"], 101);
     assert_eq!(code(&closecall(["traffic", "inspect", csv, "--drop-bad-rows"])), 0);

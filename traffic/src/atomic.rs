@@ -36,12 +36,26 @@ pub fn write_texts(
     (paths, texts): (&[PathBuf], &[String]),
     written: impl Fn(&Path),
 ) -> Result<(), WriteError> {
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+    create_folder(folder)?;
     for (path, text) in paths.iter().zip(texts) {
         write_file(path, |file| file.write_all(text.as_bytes()))?;
         written(path);
     }
     Ok(())
+}
+
+/// Creates a folder and the folders that it lies in, unless they exist.
+///
+/// # Errors
+/// [`WriteError`] if the folder cannot be created, or a file has its name.
+pub fn create_folder(path: &Path) -> Result<(), WriteError> {
+    std::fs::create_dir_all(path).map_err(|source| {
+        let reason = match source.kind() {
+            io::ErrorKind::AlreadyExists => io::Error::new(source.kind(), "it is a file, and a folder is needed"),
+            _ => source,
+        };
+        WriteError::new(path, reason)
+    })
 }
 
 /// Writes a file as [`write_atomically`] does, and names it if that fails.
@@ -109,7 +123,15 @@ fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
         const READ_AND_WRITE: u32 = 0o666;
         builder.permissions(std::fs::Permissions::from_mode(READ_AND_WRITE));
     }
-    builder.prefix(TEMPORARY_PREFIX).tempfile_in(folder)
+    builder.prefix(TEMPORARY_PREFIX).tempfile_in(folder).map_err(without_path)
+}
+
+/// Removes the temporary name from an error of `tempfile`: the caller names the file that it writes.
+fn without_path(error: io::Error) -> io::Error {
+    match error.to_string().split_once(" at path ") {
+        Some((reason, _)) => io::Error::new(error.kind(), reason),
+        None => error,
+    }
 }
 
 /// Synchronizes a folder to the disk, so that a new file name survives a power failure.
@@ -126,6 +148,29 @@ fn sync_folder(_: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_names_the_file_and_no_temporary_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("missing").join("a.txt");
+        let written = write_file(&path, |writer| writer.write_all(b"a")).unwrap_err();
+        for error in [written, check_writable(&path).unwrap_err()] {
+            let message = error.to_string();
+            assert!(message.starts_with(&format!("failed to write {}: ", path.display())), "{message}");
+            assert!(!message.contains(TEMPORARY_PREFIX) && !message.contains("at path"), "{message}");
+            assert_eq!(error.source.kind(), io::ErrorKind::NotFound);
+        }
+    }
+
+    #[test]
+    fn a_file_in_the_place_of_a_folder_is_named_as_such() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results");
+        std::fs::write(&path, "text").unwrap();
+        let error = create_folder(&path).unwrap_err().to_string();
+        assert!(error.ends_with("results: it is a file, and a folder is needed"), "{error}");
+        assert!(create_folder(&folder.path().join("a").join("b")).is_ok() && create_folder(folder.path()).is_ok());
+    }
 
     #[test]
     fn a_failed_write_keeps_the_old_file_and_leaves_no_temporary_file() {

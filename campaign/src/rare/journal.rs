@@ -15,7 +15,7 @@ use std::fs::{self, OpenOptions};
 use std::io::{BufReader, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::atomic::{WriteError, is_temporary, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, is_temporary, write_file};
 use closecall_traffic::input;
 use serde::{Deserialize, Serialize};
 
@@ -134,7 +134,7 @@ impl RareFolder {
     /// # Errors
     /// [`FolderError`] if the folder cannot be used.
     pub fn lock(path: &Path, manifest: &RareManifest, resume: bool) -> Result<Self, FolderError> {
-        fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
+        create_folder(path)?;
         let read = |source| FolderError::Read { path: path.to_owned(), source };
         let mut is_new = true;
         for entry in fs::read_dir(path).map_err(read)? {

@@ -8,7 +8,7 @@ use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::ScenarioFile;
-use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, write_file};
 
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
@@ -93,7 +93,7 @@ pub(super) fn record(
     }
     let (mut recorded, mut entries) = (Recorded::default(), Vec::new());
     for (name, chosen) in choose(&saved, scenarios, selection)? {
-        fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
+        create_folder(&path)?;
         let entry = match record_one(&saved, name, &chosen, command_for) {
             Ok(entry) => entry,
             Err(error) => {

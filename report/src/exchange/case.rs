@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::{RunKey, Scenario, ScenarioFile};
 use closecall_traffic::Parameters;
-use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, write_file};
 
 use super::closed_loop::{Writer, classes, unsaid, unsaid_of_world};
 use super::expression::Values;
@@ -148,7 +148,7 @@ pub fn write_case(folder: &Path, files: &CaseFiles) -> Result<(), WriteError> {
     for (name, text) in &files.files {
         let path = folder.join(name);
         if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(|source| WriteError::new(parent, source))?;
+            create_folder(parent)?;
         }
         write_file(&path, |file| file.write_all(text.as_bytes()))?;
     }

@@ -265,6 +265,9 @@ fn parse(text: &str) -> Result<Expression, String> {
     if is_share && !(0.0..=1.0).contains(&bound) {
         return Err(format!("the bound {bound} of a share is not from 0 to 1"));
     }
+    if aggregate == Aggregate::Count && bound < 0.0 {
+        return Err(format!("the bound {bound} of a count is below 0"));
+    }
     Ok(Expression { aggregate, quantity, condition, operator, bound })
 }
 
@@ -436,6 +439,7 @@ mod tests {
             ("count(ego_collided) <= inf", "not a finite number"),
             ("count(min_ttc_rear_s) <= 1", "is a number, which has"),
             ("p99(ego_collided) <= 1", "is a flag, which has"),
+            ("count(ego_collided) <= -1", "the bound -1 of a count is below 0"),
             ("p101(min_ttc_rear_s) <= 1", "not an aggregate"),
             ("pnan(min_ttc_rear_s) <= 1", "not an aggregate"),
             ("max(min_ttc) <= 1", "not a measure"),

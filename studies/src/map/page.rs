@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, write_file};
 use maud::{DOCTYPE, PreEscaped, html};
 
 use super::table::csv;
@@ -14,7 +14,7 @@ use super::{Map, MapPoint, svg};
 /// # Errors
 /// [`WriteError`] if a file cannot be written.
 pub fn write_map(folder: &Path, map: &Map) -> Result<Vec<PathBuf>, WriteError> {
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+    create_folder(folder)?;
     let mut files = vec![
         (folder.join("map.html"), page(map)),
         (folder.join("map.csv"), csv(map)),
