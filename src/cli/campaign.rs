@@ -56,6 +56,7 @@ use super::output::{heartbeat, outln, print_error, print_failure, print_text};
 use super::plan::PlanArgs;
 use super::rare::{DesignChoice, Rare, RareArgs};
 use super::results::{ArtifactArgs, Place, Results, ResultsArgs, print_results, selection};
+use super::terminal::error_columns;
 use crate::exit_code::ExitCode;
 
 /// Arguments of a campaign.
@@ -765,13 +766,26 @@ impl Progress {
     }
 }
 
+/// Returns the parts of a progress bar that fit into a terminal of this width (columns); `None` if it
+/// is not known. A bar that is wider than the terminal leaves a line behind at each change.
+const fn bar_template(columns: Option<usize>) -> &'static str {
+    /// Width of the bar with all its texts, and of the texts alone, for a million samples.
+    const WHOLE: usize = 100;
+    const TEXTS: usize = 60;
+    match columns {
+        Some(..TEXTS) => "{wide_bar} {pos}/{len}, {time} left",
+        Some(TEXTS..WHOLE) => "{wide_bar} {pos}/{len} samples, {rate} samples/s, {time} left",
+        Some(WHOLE..) | None => "{bar:40} {pos}/{len} samples, {rate} samples/s, {time} left",
+    }
+}
+
 /// Returns a progress bar. It is shown on standard error if that is a terminal.
 pub(super) fn progress_bar(samples: u64) -> ProgressBar {
     let bar = ProgressBar::new(samples);
     if session::is_active() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {rate} samples/s, {time} left") {
+    if let Ok(style) = ProgressStyle::with_template(bar_template(error_columns())) {
         let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
             // A bar that cannot be written has no reader.
             let _ = text.write_str(&rate_text(state.per_sec()));
@@ -799,6 +813,22 @@ mod tests {
         assert_eq!(speed_text((969.4, 3.21), 0, "1 thread"), whole);
         let nothing = "0 simulated seconds in 0.0 s on 2 threads; not run again: 20 samples";
         assert_eq!(speed_text((0.0, 0.01), 20, "2 threads"), nothing);
+    }
+
+    #[test]
+    fn a_progress_bar_is_no_wider_than_the_terminal() {
+        for columns in [24, 40, 59, 60, 80, 99, 100, 200] {
+            let template = bar_template(Some(columns));
+            let texts =
+                [("{bar:40}", " ".repeat(40).as_str()), ("{wide_bar}", ""), ("{pos}", "1000000"), ("{len}", "1000000")]
+                    .into_iter()
+                    .fold(template.to_owned(), |text, (name, value)| text.replace(name, value));
+            let line = texts.replace("{rate}", "1234.5").replace("{time}", "59 min");
+            let needed = line.chars().count();
+            // The shortest form needs 29 columns for a million samples.
+            assert!(needed <= columns.max(29), "{columns}: {line}");
+        }
+        assert_eq!(bar_template(None), bar_template(Some(200)));
     }
 
     #[test]

@@ -10,12 +10,15 @@ use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
 use super::output::{outln, print_text};
-use super::terminal::cut;
+use super::terminal::{cut, output_columns};
 use crate::exit_code::ExitCode;
 
 /// The names of the groups that `closecall list` does not list one by one.
 const FAULTS: &str = "faults";
 const MEMBERS: &str = "members";
+/// Least width of a question beside the name of its scenario (columns). In a narrower terminal the
+/// question stands below the name.
+const LEAST_QUESTION: usize = 30;
 /// The tag of a scenario that injects a fault.
 const FAULT_TAG: &str = "fault";
 
@@ -78,8 +81,14 @@ fn is_fault(scenario: &LibraryEntry) -> bool {
 fn overview(listed: &[LibraryEntry], members: &[&str]) {
     let (faults, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) = listed.iter().partition(|entry| is_fault(entry));
     let width = plain.iter().map(|scenario| scenario.name.len()).max().unwrap_or(0);
+    let has_room = output_columns().is_none_or(|columns| columns >= width + LEAST_QUESTION);
     for scenario in &plain {
-        outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));
+        if has_room {
+            outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));
+        } else {
+            outln!("{}", cut(scenario.name));
+            print_text(format_args!("  {}\n", scenario.question));
+        }
     }
     print_text(format_args!(
         "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.\n",

@@ -42,9 +42,14 @@ fn columns(terminal: impl AsFd) -> Option<usize> {
     tcgetwinsize(terminal).ok().map(|size| usize::from(size.ws_col)).filter(|columns| *columns > 0)
 }
 
+/// Returns the width of standard output, if that is a terminal whose width is known (columns).
+pub(super) fn output_columns() -> Option<usize> {
+    columns(stdout()).filter(|_| stdout().is_terminal())
+}
+
 /// Returns a line that is cut off at the width of the terminal.
 pub(super) fn cut(line: &str) -> String {
-    match columns(stdout()).filter(|_| stdout().is_terminal()) {
+    match output_columns() {
         Some(width) if line.chars().count() > width.max(LEAST_WIDTH) => {
             let kept: String = line.chars().take(width.max(LEAST_WIDTH) - 1).collect();
             format!("{kept}…")
@@ -60,6 +65,9 @@ fn has_command(line: &str) -> bool {
 
 /// Wraps each line at words. A line that goes on is indented further than its begin. `breaks_words`
 /// also breaks words that are wider than the terminal.
+///
+/// Two spaces or more separate the cells of a row. A row that is too wide goes on with a whole cell,
+/// so that the end of one cell and the begin of the next do not read as one.
 fn wrapped(text: &str, width: usize, breaks_words: bool) -> String {
     let width = width.max(LEAST_WIDTH);
     let mut lines = Vec::new();
@@ -68,14 +76,43 @@ fn wrapped(text: &str, width: usize, breaks_words: bool) -> String {
             lines.push(line.to_owned());
             continue;
         }
-        let indent = line.len() - line.trim_start().len();
-        let hanging = " ".repeat((indent + HANGING).min(width / 2));
-        let options = Options::new(width).subsequent_indent(&hanging).word_splitter(WordSplitter::NoHyphenation);
-        let options = options.break_words(breaks_words).word_separator(WordSeparator::AsciiSpace);
-        let begin = " ".repeat(indent);
-        lines.extend(wrap(line.trim_start(), options.initial_indent(&begin)).into_iter().map(|line| line.into_owned()));
+        let content = line.trim_start();
+        let indent = line.len() - content.len();
+        let cells: Vec<&str> = content.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect();
+        if cells.len() < 2 || line.chars().count() <= width {
+            lines.extend(wrapped_line(content, indent, (width, breaks_words)));
+            continue;
+        }
+        for (number, row) in rows(&cells, width.saturating_sub(indent + HANGING)).iter().enumerate() {
+            let indent = if number == 0 { indent } else { (indent + HANGING).min(width / 2) };
+            lines.extend(wrapped_line(row, indent, (width, breaks_words)));
+        }
     }
     lines.join("\n")
+}
+
+/// Joins cells to rows of at most this width (columns). A wider cell has a row of its own.
+fn rows(cells: &[&str], width: usize) -> Vec<String> {
+    let mut rows: Vec<String> = Vec::new();
+    for cell in cells {
+        match rows.last_mut() {
+            Some(row) if row.chars().count() + 2 + cell.chars().count() <= width => {
+                row.push_str("  ");
+                row.push_str(cell);
+            }
+            _ => rows.push((*cell).to_owned()),
+        }
+    }
+    rows
+}
+
+/// Wraps one line at words, to a width (columns). The flag also breaks words that are wider.
+fn wrapped_line(content: &str, indent: usize, (width, breaks_words): (usize, bool)) -> Vec<String> {
+    let hanging = " ".repeat((indent + HANGING).min(width / 2));
+    let options = Options::new(width).subsequent_indent(&hanging).word_splitter(WordSplitter::NoHyphenation);
+    let options = options.break_words(breaks_words).word_separator(WordSeparator::AsciiSpace);
+    let begin = " ".repeat(indent);
+    wrap(content, options.initial_indent(&begin)).into_iter().map(|line| line.into_owned()).collect()
 }
 
 /// Returns a style of the terminal.
@@ -142,6 +179,17 @@ mod tests {
         }
         assert_eq!(wrapped(text, 200, true), text);
         assert_eq!(wrapped("  aa bb cc dd ee ff gg hh", 20, true), "  aa bb cc dd ee ff\n    gg hh");
+    }
+
+    #[test]
+    fn a_row_goes_on_with_a_whole_cell() {
+        let row = "  40 engaged, goal in reach in 5  up to 8.9 m/s slower  12 others";
+        let lines = "  40 engaged, goal in reach in 5\n    up to 8.9 m/s slower  12 others";
+        assert_eq!(wrapped(row, 40, true), lines);
+        assert_eq!(wrapped(row, 100, true), row);
+        // A cell that is too wide goes on farther to the right than the next cell begins.
+        let narrow = "  40 engaged, goal in\n    reach in 5\n    up to 8.9 m/s\n      slower\n    12 others";
+        assert_eq!(wrapped(row, 21, true), narrow);
     }
 
     #[test]
