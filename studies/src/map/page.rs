@@ -8,6 +8,11 @@ use maud::{DOCTYPE, PreEscaped, html};
 use super::table::csv;
 use super::{Map, MapPoint, svg};
 
+/// The style of a dark page. Pictures are drawn for white paper: their lightness is inverted, and
+/// their hues stay.
+const DARK: &str = ":root{color-scheme:light dark}\
+                    @media screen and (prefers-color-scheme:dark){svg{filter:invert(1) hue-rotate(180deg)}}";
+
 /// Writes `map.html`, a picture for each front time headway, `map.csv` and `map.json` into a
 /// folder, which is created if it does not exist. Returns the paths.
 ///
@@ -38,7 +43,7 @@ fn page(map: &Map) -> String {
             head {
                 meta charset="utf-8";
                 title { "Margin of " (map.controller) }
-                style { "body{font-family:sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem}td,th{padding:.2rem .6rem;text-align:left}svg{max-width:100%;height:auto}" }
+                style { "body{font-family:sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem}td,th{padding:.2rem .6rem;text-align:left}svg{max-width:100%;height:auto}" (DARK) }
             }
             body {
                 h1 { "Margin that the system reaches" }

@@ -2,8 +2,11 @@
 
 use super::{Map, MapPoint, PAPER_IN_TIME};
 
-/// Size of a cell, and margins (px).
+/// Least width and height of a cell, and margins (px).
 const CELL: [f64; 2] = [58.0, 40.0];
+/// Width of a letter (px), and distance between the labels of two bands.
+const LETTER: f64 = 7.0;
+const BETWEEN_LABELS: f64 = 8.0;
 const LEFT: f64 = 70.0;
 const TOP: f64 = 62.0;
 const BOTTOM: f64 = 44.0;
@@ -13,19 +16,23 @@ const RIGHT: f64 = 16.0;
 pub(super) fn panel(map: &Map, front_thw_s: f64) -> String {
     let grid = &map.grid;
     let (columns, rows) = (grid.closing_kmh.len() as f64, grid.detection_m.len() as f64);
-    let (width, height) = (LEFT + columns * CELL[0] + RIGHT, TOP + rows * CELL[1] + BOTTOM);
+    let title = format!("front time headway {front_thw_s} s: margin in the loop (theory below) [s]");
+    let caption = "speed difference of the rear vehicle [km/h]; left: detection distance";
+    let bands = bands(map);
+    let cell_px = cell_width(&[title.as_str(), caption], &bands, columns);
+    let (width, height) = (LEFT + columns * cell_px + RIGHT, TOP + rows * CELL[1] + BOTTOM);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
          font-family=\"sans-serif\" font-size=\"12\" role=\"img\"><title>Margin at a front time headway of {front_thw_s} s</title>\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>"
     );
-    text(
-        &mut svg,
-        [LEFT, 18.0],
-        "start",
-        &format!("front time headway {front_thw_s} s: margin in the loop (theory below) [s]"),
-    );
-    bands(&mut svg, map);
+    text(&mut svg, [LEFT, 18.0], "start", &title);
+    for band in &bands {
+        let (x, width) = (LEFT + band.first as f64 * cell_px, band.columns as f64 * cell_px);
+        let colour = band.colour;
+        svg.push_str(&format!("<rect x=\"{x}\" y=\"28\" width=\"{width}\" height=\"8\" fill=\"{colour}\"/>"));
+        text(&mut svg, [x + 0.5 * width, 52.0], "middle", &band.label);
+    }
     for (row, &detection_m) in grid.detection_m.iter().rev().enumerate() {
         let y = TOP + row as f64 * CELL[1];
         text(&mut svg, [LEFT - 8.0, y + 0.5 * CELL[1] + 4.0], "end", &format!("{detection_m} m"));
@@ -34,30 +41,35 @@ pub(super) fn panel(map: &Map, front_thw_s: f64) -> String {
                 p.front_thw_s == front_thw_s && p.detection_m == detection_m && p.closing_kmh == closing_kmh
             };
             if let Some(point) = map.points.iter().find(is_here) {
-                cell(&mut svg, map, point, [LEFT + column as f64 * CELL[0], y]);
+                cell(&mut svg, map, point, ([LEFT + column as f64 * cell_px, y], cell_px));
             }
         }
     }
     for (column, closing_kmh) in grid.closing_kmh.iter().enumerate() {
-        let x = LEFT + (column as f64 + 0.5) * CELL[0];
+        let x = LEFT + (column as f64 + 0.5) * cell_px;
         text(&mut svg, [x, TOP + rows * CELL[1] + 16.0], "middle", &closing_kmh.to_string());
     }
-    text(
-        &mut svg,
-        [LEFT, height - 8.0],
-        "start",
-        "speed difference of the rear vehicle [km/h]; left: detection distance",
-    );
+    text(&mut svg, [LEFT, height - 8.0], "start", caption);
     svg.push_str("</svg>");
     svg
 }
 
-/// Draws the paper's region "in time" as bars above the columns whose speed difference lies in it.
-fn bands(svg: &mut String, map: &Map) {
+/// Adjacent columns of the paper's region "in time", drawn as a bar above them.
+struct Band {
+    /// The first column.
+    first: usize,
+    columns: usize,
+    colour: &'static str,
+    label: String,
+}
+
+/// Returns the bands of the columns whose speed difference lies in the paper's region.
+fn bands(map: &Map) -> Vec<Band> {
     let kmh = &map.grid.closing_kmh;
     let mut low = f64::NEG_INFINITY;
-    let bands = PAPER_IN_TIME.into_iter().chain([(f64::INFINITY, "never")]);
-    for ((high, share), colour) in bands.zip(["#2a9d4a", "#e0b030", "#c8c8c8", "#c94a3b"]) {
+    let mut bands = Vec::new();
+    let regions = PAPER_IN_TIME.into_iter().chain([(f64::INFINITY, "never")]);
+    for ((high, share), colour) in regions.zip(["#2a9d4a", "#e0b030", "#c8c8c8", "#c94a3b"]) {
         // The paper: always below 20 km/h, a share up to 25 km/h, and never above 30 km/h.
         let is_in = |value: &f64| {
             if share == "always" {
@@ -68,16 +80,23 @@ fn bands(svg: &mut String, map: &Map) {
         };
         let columns: Vec<usize> = (0..kmh.len()).filter(|&column| is_in(&kmh[column])).collect();
         if let (Some(first), Some(last)) = (columns.first(), columns.last()) {
-            let x = LEFT + *first as f64 * CELL[0];
-            let width = (last - first + 1) as f64 * CELL[0];
-            svg.push_str(&format!("<rect x=\"{x}\" y=\"28\" width=\"{width}\" height=\"8\" fill=\"{colour}\"/>"));
-            text(svg, [x + 0.5 * width, 52.0], "middle", &format!("paper: {share}"));
+            bands.push(Band { first: *first, columns: last - first + 1, colour, label: format!("paper: {share}") });
         }
         low = high;
     }
+    bands
 }
 
-fn cell(svg: &mut String, map: &Map, point: &MapPoint, [x, y]: [f64; 2]) {
+/// Returns the width of a cell (px): the lines fit into the picture, and each label above its band.
+fn cell_width(lines: &[&str], bands: &[Band], columns: f64) -> f64 {
+    let text_px = |text: &str| LETTER * text.chars().count() as f64;
+    let for_lines = lines.iter().map(|line| text_px(line) / columns);
+    let for_bands = bands.iter().map(|band| (text_px(&band.label) + BETWEEN_LABELS) / band.columns as f64);
+    for_lines.chain(for_bands).fold(CELL[0], f64::max).ceil()
+}
+
+/// Draws a cell at this place, with this width (px).
+fn cell(svg: &mut String, map: &Map, point: &MapPoint, ([x, y], width): ([f64; 2], f64)) {
     let share = point.loop_s.map_or(0.0, |s| (s / map.goal_s).clamp(0.0, 1.0));
     // From white to green. A point in time has a dark frame.
     let channel = |from: f64, to: f64| (from + share * (to - from)).round();
@@ -88,16 +107,45 @@ fn cell(svg: &mut String, map: &Map, point: &MapPoint, [x, y]: [f64; 2]) {
          stroke-width=\"{}\"/>",
         x + 1.5,
         y + 1.5,
-        CELL[0] - 3.0,
+        width - 3.0,
         CELL[1] - 3.0,
         if point.is_in_time_in_loop { 2 } else { 1 },
     ));
     let number = |s: Option<f64>| s.map_or_else(|| "-".to_owned(), |s| format!("{s:.2}"));
     let mark = if point.agrees() { "" } else { " !" };
-    text(svg, [x + 0.5 * CELL[0], y + 17.0], "middle", &format!("{}{mark}", number(point.loop_s)));
-    text(svg, [x + 0.5 * CELL[0], y + 32.0], "middle", &number(point.theory_s));
+    text(svg, [x + 0.5 * width, y + 17.0], "middle", &format!("{}{mark}", number(point.loop_s)));
+    text(svg, [x + 0.5 * width, y + 32.0], "middle", &number(point.theory_s));
 }
 
 fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, words: &str) {
     svg.push_str(&format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{words}</text>"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn band(first: usize, columns: usize, label: &str) -> Band {
+        Band { first, columns, colour: "#c8c8c8", label: label.to_owned() }
+    }
+
+    #[test]
+    fn a_map_of_few_columns_has_room_for_its_lines_and_for_the_label_of_each_band() {
+        let line = "speed difference of the rear vehicle [km/h]; left: detection distance";
+        for columns in 1..12 {
+            let width = cell_width(&[line], &[], f64::from(columns));
+            assert!(width >= CELL[0] && f64::from(columns) * width >= LETTER * line.chars().count() as f64);
+        }
+        let bands = [band(0, 1, "paper: always"), band(1, 1, "paper: 59 %"), band(2, 6, "paper: not stated")];
+        let width = cell_width(&[], &bands, 8.0);
+        let ends = bands.iter().map(|band| {
+            let middle = (band.first as f64 + 0.5 * band.columns as f64) * width;
+            let half = 0.5 * LETTER * band.label.chars().count() as f64;
+            [middle - half, middle + half]
+        });
+        let ends: Vec<[f64; 2]> = ends.collect();
+        assert!(ends.windows(2).all(|pair| pair[0][1] < pair[1][0]), "{ends:?}");
+        // Many columns in each band need no more room.
+        assert_eq!(cell_width(&[line], &[band(0, 9, "paper: always")], 9.0), CELL[0]);
+    }
 }
