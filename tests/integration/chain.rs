@@ -125,6 +125,7 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
     for origin in origins {
         let [lead, ego, rear] = ["lead_track", "ego_track", "rear_track"].map(|key| origin[key].as_u64().unwrap());
         assert_eq!((ego, rear), (lead + 1, lead + 2), "the vehicles of one group on one carriageway: {origin}");
+        assert!(page.contains(&format!("Recorded: track {rear}, the rear vehicle, is blue. ")), "{rear}");
         carriageways.insert((lead / 3) % 2);
         let [from_s, to_s] = ["from_s", "to_s"].map(|key| origin[key].as_f64().unwrap());
         assert!(from_s < to_s && page.contains(&format!("{from_s:.1} to {to_s:.1} s")), "{origin}");
