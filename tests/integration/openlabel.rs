@@ -220,6 +220,69 @@ fn cuboids_of_another_program_are_read_without_lanes() {
     assert_eq!(json_of(&traffic("lane-changes", &path, &["--lanes", "none", "--format", "json"]), 0), changes);
 }
 
+/// The file of [`of_others`] with these timestamps and a frame rate of 20 Hz, which contradicts 10 Hz.
+fn stamped(text: impl Fn(i32) -> Value) -> Value {
+    let mut value = of_others("world", "scene_cs", |frame| match text(frame) {
+        Value::Null => json!({}),
+        stamp => json!({ "timestamp": stamp }),
+    });
+    value["openlabel"]["metadata"]["frame_rate"] = json!(20.0);
+    value
+}
+
+#[test]
+fn instants_of_iso_8601_are_times_of_frames_whatever_the_frame_rate_says() {
+    let folder = folder();
+    let found = |value: &Value| {
+        let path = written(folder.path(), value);
+        let changes = json_of(&traffic("lane-changes", &path, &["--lanes", "none", "--format", "json"]), 0);
+        let [change] = &changes.as_array().unwrap()[..] else { panic!("{changes}") };
+        let quantity = |key: &str| change[key].as_f64().unwrap();
+        (quantity("speed_mps"), quantity("duration_s"), quantity("crossing_s"))
+    };
+    let (speed_mps, duration_s, crossing_s) = found(&stamped(|frame| json!(0.1 * f64::from(frame))));
+    let clock = |frame: i32| (30 + frame / 600, frame / 10 % 60, frame % 10);
+    let utc = |frame| {
+        let (minute, second, tenth) = clock(frame);
+        json!(format!("2020-04-11T12:{minute}:{second:02}.{tenth}Z"))
+    };
+    let blank = |frame| {
+        let (minute, second, tenth) = clock(frame);
+        json!(format!("2020-04-11 12:{minute}:{second:02}.{tenth}00"))
+    };
+    let offset = |frame| {
+        let (minute, second, tenth) = clock(frame);
+        json!(format!("2020-04-11T14:{minute}:{second:02}.{tenth}+02:00"))
+    };
+    let number = |frame: i32| json!(format!(" {:.1} ", 0.1 * f64::from(frame)));
+    for value in [stamped(utc), stamped(blank), stamped(offset), stamped(number)] {
+        let instants = found(&value);
+        assert!((instants.0 - speed_mps).abs() < 1e-3 && (speed_mps - 30.0).abs() < 0.1, "{instants:?}");
+        assert!((instants.1 - duration_s).abs() < 1e-3 && (instants.2 - crossing_s).abs() < 1e-3, "{instants:?}");
+    }
+}
+
+#[test]
+fn a_timestamp_that_is_no_time_is_refused_in_spite_of_a_frame_rate() {
+    let folder = folder();
+    let seconds = |frame: i32| json!(0.1 * f64::from(frame));
+    let at_seven = |wrong: Value| stamped(move |frame| if frame == 7 { wrong.clone() } else { seconds(frame) });
+    let cases = [
+        (at_seven(json!("x")), "`openlabel.frames.7.frame_properties.timestamp` is \"x\""),
+        (at_seven(json!("")), "timestamp` is \"\""),
+        (at_seven(json!("2020-13-11T12:00:00Z")), "an instant in UTC"),
+        (at_seven(json!("1950-04-11T12:00:00Z")), "up to the year 2100"),
+        (at_seven(json!("NaN")), "timestamp` is \"NaN\""),
+        (at_seven(Value::Null), "frames.7.frame_properties.timestamp` is missing, but other frames have one"),
+    ];
+    for (value, needed) in cases {
+        let output = traffic("lane-changes", &written(folder.path(), &value), &["--lanes", "none"]);
+        let said = message(&output);
+        assert_eq!(code(&output), 3, "{said}");
+        assert!(said.contains(needed), "`{said}` does not say `{needed}`");
+    }
+}
+
 #[test]
 fn what_a_file_of_another_program_lacks_is_named() {
     let folder = folder();

@@ -11,8 +11,9 @@
 //!
 //! - A cuboid is x, y, z, three angles, length, width, height, or has a quaternion in place of the
 //!   angles. x of the vehicle points forward.
-//! - The time of a frame is its timestamp in seconds. Without one, `frame_rate` (Hz) of `metadata` or
-//!   of a stream gives it.
+//! - The time of a frame is its timestamp: a number of seconds, as such or as text, or an instant in
+//!   UTC such as `2020-04-11T12:00:01.2Z` (ISO 8601; without an offset, UTC is meant). If no frame has
+//!   a timestamp, `frame_rate` (Hz) of `metadata` or of a stream gives the times.
 //! - Files of other programs state no lanes, so that these have to be estimated. Speeds that no number
 //!   `speed_mps` states are derived from the positions.
 //! - A file that lacks one of these is refused, with the place where it is missing.
@@ -178,23 +179,59 @@ impl<'t> Times<'t> {
     /// Returns the time of a frame.
     fn at(&self, frame: i64) -> Result<Time, ReadError> {
         let path = || format!("`openlabel.frames.{frame}.frame_properties.timestamp`");
-        let seconds = match (self.timestamps.get(&frame), self.period_s) {
-            (Some(Timestamp::Seconds(seconds)), _) => Some(*seconds),
-            (Some(Timestamp::Text(text)), period_s) => {
-                text.trim().parse().ok().or(period_s.map(|period_s| frame as f64 * period_s))
+        let stated = self.timestamps.get(&frame);
+        let time = match (stated, self.period_s) {
+            (Some(Timestamp::Seconds(seconds)), _) => in_epoch(*seconds),
+            (Some(Timestamp::Text(text)), _) => text_time(text.trim()),
+            (None, Some(period_s)) if self.timestamps.is_empty() => in_epoch(frame as f64 * period_s),
+            (None, Some(_)) => {
+                return Err(refused(format!(
+                    "{} is missing, but other frames have one: a timestamp in each frame is needed, or `frame_rate` (Hz) and none",
+                    path()
+                )));
             }
-            (None, period_s) => period_s.map(|period_s| frame as f64 * period_s),
+            (None, None) => {
+                return Err(refused(format!(
+                    "{} is missing: the time of each frame in seconds is needed, or `frame_rate` (Hz) in `openlabel.metadata` or in the \
+                     `stream_properties` of a stream",
+                    path()
+                )));
+            }
         };
-        match seconds {
-            Some(seconds) if EPOCH_S.contains(seconds) => Ok(Time::from_s(seconds)),
-            Some(seconds) => Err(refused(format!("{} is {seconds}, but a time in seconds is needed", path()))),
-            None => Err(refused(format!(
-                "{} is missing or no number: the time of each frame in seconds is needed, or `frame_rate` (Hz) in `openlabel.metadata` \
-                 or in the `stream_properties` of a stream",
-                path()
-            ))),
-        }
+        time.ok_or_else(|| {
+            let actual = match stated {
+                Some(Timestamp::Seconds(seconds)) => format!("{seconds:?}"),
+                Some(Timestamp::Text(text)) => format!("\"{}\"", text.chars().take(40).collect::<String>()),
+                None => format!("missing, and frame {frame} of `frame_rate` is outside of the allowed times"),
+            };
+            refused(format!(
+                "{} is {actual}, but a time in seconds from 0 to {}, or an instant in UTC such as \"2020-04-11T12:00:01.2Z\" up to the \
+                 year 2100 is needed",
+                path(),
+                EPOCH_S.high
+            ))
+        })
     }
+}
+
+/// Returns a time in seconds, or `None` if it is outside of [`EPOCH_S`].
+fn in_epoch(seconds: f64) -> Option<Time> {
+    EPOCH_S.contains(seconds).then(|| Time::from_s(seconds))
+}
+
+/// Returns the time that a text states in seconds, or as an instant of ISO 8601. An instant without an
+/// offset is in UTC, as OpenLABEL states.
+fn text_time(text: &str) -> Option<Time> {
+    if let Ok(seconds) = text.parse() {
+        return in_epoch(seconds);
+    }
+    let in_utc = || {
+        let instant: jiff::civil::DateTime = text.parse().ok()?;
+        Some(instant.to_zoned(jiff::tz::TimeZone::UTC).ok()?.timestamp())
+    };
+    let instant = text.parse::<jiff::Timestamp>().ok().or_else(in_utc)?;
+    let time = Time::from_ns(i64::try_from(instant.as_nanosecond()).ok()?);
+    EPOCH_S.contains(time.s()).then_some(time)
 }
 
 /// Seconds since the start of the recording, or since 1970 up to the year 2100.
