@@ -18,7 +18,7 @@ use super::continuity::LONGEST_BRIDGE;
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
-use super::inferred_road::{InferredRoad, Placed, Pose};
+use super::inferred_road::{InferredRoad, MIRRORED, Placed, Pose};
 use super::lane_sides::LaneSides;
 use super::markings::LaneMarkings;
 use super::plain::allowed;
@@ -162,6 +162,7 @@ impl Collected {
         })?;
         notes.extend(road.iter().flat_map(InferredRoad::warnings));
         let is_in_doubt = road.as_ref().is_some_and(InferredRoad::is_in_doubt);
+        let is_mirrored = road.as_ref().is_some_and(InferredRoad::is_mirrored);
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
         let mut jumps = 0;
@@ -233,7 +234,8 @@ impl Collected {
         let markings = facts.markings.or_else(|| road.as_ref().map(InferredRoad::markings));
         let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
         let (items, unknown_classes) = (items.collect(), facts.unknown_classes);
-        Ok(CollectedSource { items, info, notes, is_in_doubt, unknown_classes, lane_sides: LaneSides::default() })
+        let lane_sides = LaneSides::default();
+        Ok(CollectedSource { items, info, notes, is_in_doubt, is_mirrored, unknown_classes, lane_sides })
     }
 }
 
@@ -393,6 +395,8 @@ pub(super) struct CollectedSource {
     info: FileInfo,
     notes: Vec<String>,
     is_in_doubt: bool,
+    /// `true` if lanes with higher indices lie further to the right, and no option says so.
+    is_mirrored: bool,
     unknown_classes: UnknownClasses,
     lane_sides: LaneSides,
 }
@@ -420,7 +424,12 @@ impl RowSource for CollectedSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.notes.clone()
+        let mirrored = self.is_mirrored.then(|| MIRRORED.to_owned());
+        self.notes.iter().cloned().chain(mirrored).collect()
+    }
+
+    fn expect_mirrored(&mut self) {
+        self.is_mirrored = false;
     }
 
     fn check_lane_sides(&self, is_mirrored: bool) -> Result<(), ReadError> {
@@ -428,7 +437,7 @@ impl RowSource for CollectedSource {
     }
 
     fn is_in_doubt(&self) -> bool {
-        self.is_in_doubt
+        self.is_in_doubt || self.is_mirrored
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

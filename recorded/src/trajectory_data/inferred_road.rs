@@ -99,8 +99,8 @@ const MOST_CHOICES: usize = 8;
 /// positions are measured from a better line.
 const AXIS_TURNS: usize = 3;
 
-/// The doubt about a file whose indices grow to the right.
-const MIRRORED: &str = "lanes with higher indices lie further to the right, but the layout counts them from the right: the file is mirrored, \
+/// The doubt about a file whose indices grow to the right, unless its reader is told that it is mirrored.
+pub(super) const MIRRORED: &str = "lanes with higher indices lie further to the right, but the layout counts them from the right: the file is mirrored, \
      so that left is called right, or its traffic drives on the left";
 
 /// The position of one vehicle in one row, and what it says of the lanes.
@@ -206,6 +206,8 @@ pub(super) struct InferredRoad {
     astray: f64,
     /// Why the lanes of the road are in doubt.
     doubts: Vec<String>,
+    /// `true` if lanes with higher indices lie further to the right.
+    is_mirrored: bool,
 }
 
 /// The path of one vehicle.
@@ -245,7 +247,8 @@ impl InferredRoad {
             let heading_rad = path.heading_rad;
             Some(Direction { reference: path.vehicle, ..Direction::along(line, heading_rad) })
         });
-        let mut road = Self { lane_width_m, directions: directions.collect(), astray: 0.0, doubts: Vec::new() };
+        let directions: Vec<Direction> = directions.collect();
+        let mut road = Self { lane_width_m, directions, astray: 0.0, doubts: Vec::new(), is_mirrored: false };
         if road.directions.is_empty() {
             return Ok(Err(TrajectoryFileProblem::NothingMoves));
         }
@@ -345,9 +348,7 @@ impl InferredRoad {
             let LaneNumbers { numbers, is_mirrored } =
                 LaneNumbers::of_strands(measured, &direction.strands, self.lane_width_m);
             direction.numbers = numbers;
-            if is_mirrored {
-                doubts.insert(MIRRORED.to_owned());
-            }
+            self.is_mirrored |= is_mirrored;
             let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
             for ((_, strand, beside), count) in rows.iter().filter(|((other, ..), _)| *other == index) {
                 let lane = strand.and_then(|strand| direction.numbers.get(&strand)).unwrap_or(beside);
@@ -378,6 +379,11 @@ impl InferredRoad {
     /// Returns the vehicle whose path is the reference line of a direction.
     pub(super) fn reference(&self, direction: usize) -> Option<u64> {
         self.directions.get(direction)?.reference
+    }
+
+    /// Returns `true` if lanes with higher indices lie further to the right.
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.is_mirrored
     }
 
     /// Returns `true` if the lanes of the road are in doubt, as a warning says.

@@ -108,6 +108,9 @@ pub(super) trait RowSource {
     /// negative. It is called before the first row.
     fn expect_reversed(&mut self) {}
 
+    /// States that the lateral position is mirrored. It is called before the first row.
+    fn expect_mirrored(&mut self) {}
+
     /// Returns the next row in the order of the file, or `None` at its end.
     ///
     /// # Errors

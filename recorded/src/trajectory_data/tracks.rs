@@ -172,6 +172,9 @@ impl<'a> Tracks<'a> {
         if options.axes.reverse_s {
             source.expect_reversed();
         }
+        if options.axes.mirror_d {
+            source.expect_mirrored();
+        }
         let builder = TrackBuilder::for_sorted(FrameClock::every_frame(ngsim::PERIOD), Time::ZERO);
         let mut tracks = Self {
             path: path.to_owned(),

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use closecall_recorded::filters::smooth;
-use closecall_recorded::lane_change::detect;
+use closecall_recorded::lane_change::{LaneReliability, detect};
 use closecall_recorded::trajectory_data::{
     AxisOptions, BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError,
     TrajectoryFileProblem, open_from, read, read_from, read_with,
@@ -423,7 +423,14 @@ fn mirrored_files_of_sumo_and_vissim_are_refused_and_the_named_options_mend_them
         let problem = read_text(text.as_bytes()).unwrap_err().problem;
         assert!(matches!(problem, TrajectoryFileProblem::IndexAgainstPosition { .. }), "{problem}");
         let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
-        assert_one_lane_change(&tracks.and_then(|tracks| tracks.collect_all()).unwrap());
+        let data = tracks.and_then(|tracks| tracks.collect_all()).unwrap();
+        assert!(!data.is_in_doubt && !data.notes.iter().any(|note| note.contains("mirrored")), "{:?}", data.notes);
+        assert_one_lane_change(&data);
+        // Without the options, and without recorded lanes, the sides are in doubt.
+        let options = ReadOptions { lanes: LaneReliability::Unreliable, ..ReadOptions::default() };
+        let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
+        let data = tracks.and_then(|tracks| tracks.collect_all()).unwrap();
+        assert!(data.is_in_doubt && data.notes.iter().any(|note| note.contains("mirrored")), "{:?}", data.notes);
     }
     // The options do not pass on a file that is as it should be.
     assert!(open_from(sumo_xml(false).as_bytes(), Path::new("a"), options, usize::MAX).is_err());
