@@ -40,11 +40,24 @@ pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<
     let traffic = Traffic { data, carriageways: &Carriageways::of(data.trajectories()) };
     let evaluated = detect(data).into_iter().filter_map(|lane_change| {
         let Evaluation { metrics, following } = evaluate(traffic, &lane_change, window(&lane_change), judgement)?;
-        let (half, crossing) = (Time::from_ns(PERIOD.ns() / 2), Time::from_s(lane_change.crossing_s));
-        let at_crossing = evaluate(traffic, &lane_change, [crossing - half, crossing + half], judgement)?;
+        let instant = instant_of_crossing(data, &lane_change)?;
+        let at_crossing = evaluate(traffic, &lane_change, [instant, instant], judgement)?;
         Some(CriticalLaneChange { lane_change, metrics, following, at_crossing })
     });
     evaluated.collect()
+}
+
+/// Returns the instant of the common clock that is nearest to the crossing. Of two equally near ones,
+/// this is the later one: at the crossing, the vehicle is in its new lane. Returns the crossing itself
+/// if the track has no instant within half a period of it, and `None` if `data` does not have the
+/// track.
+fn instant_of_crossing(data: &SmoothedTrajectoryData, lane_change: &LaneChange) -> Option<Time> {
+    let track = &data.tracks[data.track_index(lane_change.track_id)?].trajectory;
+    let crossing = Time::from_s(lane_change.crossing_s);
+    let distance_ns = |time: &Time| (*time - crossing).ns().abs();
+    let times = track.points.iter().map(|point| point.time).rev();
+    let nearest = times.min_by_key(distance_ns);
+    Some(nearest.filter(|time| 2 * distance_ns(time) <= PERIOD.ns()).unwrap_or(crossing))
 }
 
 /// Returns the first and the last instant of a lane change. The estimated manoeuvre may end before
@@ -410,6 +423,34 @@ mod tests {
         assert_eq!(absent(alone.following.ttc_s), Some(Absent::NoLead));
         let away = evaluated(vec![straight_track(2, 50.0, 40.0, -5.25, 110)]);
         assert_eq!(absent(away.following.drac_mps2), Some(Absent::NotApproaching));
+    }
+
+    #[test]
+    fn all_values_at_the_crossing_have_one_instant_the_later_of_two_equally_near() {
+        // Crossings lie on frames of 10 Hz: on instants of 5 Hz, and halfway between them.
+        let mut halfway = 0;
+        for frame in 0..4 {
+            let start_s = 3.05 + 0.1 * f64::from(frame);
+            let tracks = vec![
+                changing_track(1, (0.0, 30.0), (-5.25, -1.75), (start_s, 5.0), 120),
+                straight_track(2, 50.0, 26.0, -1.75, 120),
+                straight_track(3, -40.0, 34.0, -1.75, 120),
+            ];
+            let change = criticality(&smooth(&trajectory_data_of(tracks)), &Judgement::default()).remove(0);
+            let crossing = Time::from_s(change.lane_change.crossing_s);
+            let past_ns = crossing.ns() % PERIOD.ns();
+            halfway += usize::from(2 * past_ns == PERIOD.ns());
+            let later = if 2 * past_ns >= PERIOD.ns() { PERIOD.ns() - past_ns } else { -past_ns };
+            let instant = Time::from_ns(crossing.ns() + later);
+            let values = change.named().filter_map(|(name, _, at_crossing)| match at_crossing {
+                MetricResult::Value { time_s, .. } => Some((name, Time::from_s(time_s))),
+                MetricResult::Absent { .. } => None,
+            });
+            let values: Vec<_> = values.collect();
+            assert!(values.len() >= 7, "{values:?}");
+            assert!(values.iter().all(|(_, time)| *time == instant), "{instant}: {values:?}");
+        }
+        assert!(halfway > 0);
     }
 
     #[test]

@@ -13,8 +13,8 @@
 //!
 //! In addition, two metrics without a threshold: the time to collision `ttc_s` (TTC) and the
 //! deceleration rate to avoid a crash `drac_mps2` (DRAC), both towards the vehicles ahead that
-//! count for THW, at constant speeds of both vehicles. All metrics are also evaluated at the
-//! instant of the crossing alone.
+//! count for THW, at constant speeds of both vehicles. All metrics are also evaluated at one instant
+//! alone: the instant of the common clock nearest to the crossing, the later one of two equally near.
 //!
 //! # Definitions
 //!

@@ -127,7 +127,7 @@ pub struct CriticalLaneChange {
     pub metrics: Metrics,
     /// Two further metrics over the whole lane change.
     pub following: FollowingMetrics,
-    /// All metrics at the instant of the crossing alone.
+    /// All metrics at the instant nearest to the crossing alone.
     pub at_crossing: Evaluation,
 }
 
