@@ -5,10 +5,15 @@ use closecall_traffic::{Lane, Side, Time};
 use crate::filters::Stay;
 
 /// Shortest time in a lane before and after a crossing.
-pub(super) const MIN_DWELL: Time = Time::from_ms(500);
+pub(crate) const MIN_DWELL: Time = Time::from_ms(500);
 
 /// Tolerance of the dwell time, because recorded times are rounded.
 const ROUNDING: Time = Time::from_ms(5);
+
+/// Returns true if a vehicle is long enough in a lane to stay there.
+pub(crate) fn is_stay(duration: Time) -> bool {
+    duration + ROUNDING >= MIN_DWELL
+}
 
 /// A change of the recorded lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +37,7 @@ impl Crossing {
 pub(super) fn crossings(stays: &[Stay]) -> Vec<Crossing> {
     let mut crossings = Vec::new();
     let mut current: Option<Lane> = None;
-    for stay in stays.iter().filter(|stay| stay.duration + ROUNDING >= MIN_DWELL) {
+    for stay in stays.iter().filter(|stay| is_stay(stay.duration)) {
         if let Some(from) = current.filter(|from| *from != stay.lane) {
             crossings.push(Crossing { time: stay.first, from, to: stay.lane });
         }

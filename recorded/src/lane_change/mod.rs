@@ -100,6 +100,7 @@ mod score;
 
 pub use basis::DetectionBasis;
 pub use change::LaneChange;
+pub(crate) use crossings::{MIN_DWELL, is_stay};
 pub use detect::{Criterion, LaneChangeDetector, detect};
 pub use find::{FoundLaneChanges, find};
 pub use lane_reliability::LaneReliability;

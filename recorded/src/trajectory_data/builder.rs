@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use closecall_traffic::Time;
 
 use super::assemble::{Step, assemble_track, step};
-use super::continuity::{Continuity, FrameClock, bridge, compared_until, hides_crossing, is_jump};
+use super::continuity::{Continuity, CutEnds, FrameClock, bridge, compared_until, hides_crossing, is_jump};
 use super::data::RecordedTrack;
 use super::error::TrajectoryFileProblem;
 use super::order::{Order, TimeOrder, VehicleOrder};
@@ -33,10 +33,20 @@ pub(super) struct TrackBuilder {
     /// The last rows of complete tracks, by vehicle and origin: of the latest track alone if the rows
     /// arrive by vehicle, and of tracks that end shortly before the latest row if they arrive by time.
     ends: BTreeMap<(u64, Time), Row>,
-    /// Number of pieces completed so far, by vehicle number.
-    pieces: BTreeMap<u64, u64>,
+    /// Pieces completed so far, by vehicle number.
+    pieces: BTreeMap<u64, Pieces>,
     ready: VecDeque<RecordedTrack>,
     continuity: Continuity,
+}
+
+/// The completed pieces of a vehicle.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pieces {
+    count: u64,
+    /// Origin of the latest one.
+    origin: Time,
+    /// `true` if the end of the latest one cuts off a lane change.
+    ends_cut: bool,
 }
 
 /// The check of the row order that the builder applies.
@@ -132,7 +142,11 @@ impl TrackBuilder {
 
     /// Returns how the rows so far became tracks.
     pub(super) fn continuity(&self) -> Continuity {
-        Continuity { vehicles: self.pieces.len() as u64, pieces: self.pieces.values().sum(), ..self.continuity }
+        Continuity {
+            vehicles: self.pieces.len() as u64,
+            pieces: self.pieces.values().map(|pieces| pieces.count).sum(),
+            ..self.continuity
+        }
     }
 
     /// Returns the complete tracks that [`TrackBuilder::pop`] has not removed yet.
@@ -169,8 +183,17 @@ impl TrackBuilder {
         }
         self.ends.insert((last.vehicle_id, last.origin), *last);
         let pieces = self.pieces.entry(first.number).or_default();
-        let piece = *pieces;
-        *pieces += 1;
+        let Pieces { count: piece, origin, ends_cut } = *pieces;
+        let cut = CutEnds::of(rows, self.clock.period);
+        *pieces = Pieces { count: piece + 1, origin: first.origin, ends_cut: cut.end };
+        if piece > 0 && origin == first.origin {
+            // The piece before does not end where its vehicle leaves the recording.
+            self.continuity.edge_crossings -= u64::from(ends_cut);
+            self.continuity.split_crossings += u64::from(ends_cut) + u64::from(cut.start);
+        } else {
+            self.continuity.edge_crossings += u64::from(cut.start);
+        }
+        self.continuity.edge_crossings += u64::from(cut.end);
         if first.number >= PIECE_STRIDE && piece > 0 {
             // The number already belongs to a piece of a split track, so no number is left for its
             // own pieces.

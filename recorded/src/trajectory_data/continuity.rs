@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::data::MarkingDistances;
 use super::source::{Clock, Row};
+use crate::lane_change::{MIN_DWELL, is_stay};
 
 /// Longest time that is missing between two rows of one track. A car crosses a marking in a few
 /// times as long.
@@ -27,6 +28,12 @@ const LONGEST_HIDDEN: Time = Time::from_ms(10_000);
 /// One in this number of lane changes may be hidden in a gap before a result is in doubt. An
 /// assumption with a plausible range of 5 to 20.
 const ONE_HIDDEN_IN: u64 = 10;
+
+/// One in this number of lane changes may be cut off where a vehicle enters or leaves the recording
+/// before a result is in doubt, and the least number of them. In windows of US-101, at most one in five
+/// is. An assumption with a plausible range of 2 to 4.
+const ONE_CUT_IN: u64 = 3;
+const LEAST_CUT: u64 = 3;
 
 /// Excess over the recorded speed that makes a step along the road a jump (m/s). No vehicle is so
 /// fast within one step; errors of NGSIM's positions stay below it.
@@ -103,12 +110,28 @@ pub struct Continuity {
     pub recorded_crossings: u64,
     /// Changes of the recorded lane in gaps that are not bridged: between two pieces of one vehicle.
     pub hidden_crossings: u64,
+    /// Changes of the recorded lane within a track, so near the gap or the jump at which the track of a
+    /// vehicle is split that no lane change can be followed.
+    pub split_crossings: u64,
+    /// The same, near the first or the last row of a vehicle.
+    pub edge_crossings: u64,
 }
 
 impl Continuity {
     /// Returns true if so many lane changes are hidden in gaps that a result is in doubt.
     pub fn hides_lane_changes(&self) -> bool {
-        ONE_HIDDEN_IN * self.hidden_crossings > self.recorded_crossings + self.hidden_crossings
+        ONE_HIDDEN_IN * (self.hidden_crossings + self.split_crossings) > self.all_crossings()
+            || self.cuts_lane_changes()
+    }
+
+    /// Returns true if so many lane changes are cut off where vehicles enter or leave the recording that
+    /// a result is in doubt.
+    fn cuts_lane_changes(&self) -> bool {
+        self.edge_crossings >= LEAST_CUT && ONE_CUT_IN * self.edge_crossings > self.all_crossings()
+    }
+
+    fn all_crossings(&self) -> u64 {
+        self.recorded_crossings + self.hidden_crossings
     }
 
     /// Returns the notes on it for a reader of results.
@@ -131,8 +154,26 @@ impl Continuity {
             warnings.push(format!(
                 "{} of {} changes of the recorded lane lie in gaps of more than {} s, in which no lane change can be followed",
                 self.hidden_crossings,
-                self.recorded_crossings + self.hidden_crossings,
+                self.all_crossings(),
                 LONGEST_BRIDGE.s()
+            ));
+        }
+        if self.split_crossings > 0 {
+            warnings.push(format!(
+                "{} of {} changes of the recorded lane lie less than {} s before or after a gap or a jump that splits a track, where no \
+                 lane change can be followed",
+                self.split_crossings,
+                self.all_crossings(),
+                MIN_DWELL.s()
+            ));
+        }
+        if self.cuts_lane_changes() {
+            warnings.push(format!(
+                "{} of {} changes of the recorded lane lie less than {} s after the first or before the last row of their vehicle, where \
+                 no lane change can be followed: tracks have to begin before a lane change, and to end after it",
+                self.edge_crossings,
+                self.all_crossings(),
+                MIN_DWELL.s()
             ));
         }
         if self.bridged_gaps > 0 {
@@ -144,6 +185,30 @@ impl Continuity {
             ));
         }
         warnings
+    }
+}
+
+/// The ends of a track that cut off a lane change: the recorded lane changes there, and the vehicle is
+/// not long enough in the outer lane to stay in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct CutEnds {
+    pub(super) start: bool,
+    pub(super) end: bool,
+}
+
+impl CutEnds {
+    /// Finds them in the rows of a track. Lane 0 means no lane.
+    pub(super) fn of(rows: &[Row], period: Time) -> Self {
+        let stays: Vec<&[Row]> = rows.chunk_by(|a, b| a.lane == b.lane).collect();
+        let is_cut = |outer: &[Row], inner: &[Row]| {
+            let are_lanes = [outer, inner].iter().all(|stay| stay.first().is_some_and(|row| row.lane > 0));
+            are_lanes && !is_stay(period * outer.len() as i64)
+        };
+        let (&[first, second, ..], &[.., before_last, last]) = (&stays[..], &stays[..]) else { return Self::default() };
+        let start = is_cut(first, second);
+        // A single change of the lane counts once.
+        let end = is_cut(last, before_last) && !(start && stays.len() == 2);
+        Self { start, end }
     }
 }
 
@@ -208,4 +273,74 @@ pub(super) fn bridge(before: &Row, row: &Row, clock: FrameClock) -> Option<Vec<R
         }
     };
     Some((1..steps).map(missing).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+    use std::path::Path;
+
+    use super::Continuity;
+    use crate::trajectory_data::{ReadOptions, open_from};
+
+    const HEADER: &str = "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n";
+
+    /// Reads five vehicles that enter lane 2 at frame 50 of 10 Hz, in the frames that `is_there` allows.
+    fn read(is_there: impl Fn(i32) -> bool) -> Continuity {
+        let mut text = HEADER.to_owned();
+        for track in 1..=5 {
+            for frame in (0..100).filter(|frame| is_there(*frame)) {
+                let (time_s, s_m) = (0.1 * f64::from(frame), 60.0 * f64::from(track) + 3.0 * f64::from(frame));
+                let d_m = 1.875 + 3.75 * ((time_s - 3.0) / 4.0).clamp(0.0, 1.0);
+                let lane = if frame < 50 { 1 } else { 2 };
+                writeln!(text, "{track},{frame},{time_s:.1},{s_m},{d_m:.3},{lane},30,0,4.5,1.8,car").unwrap();
+            }
+        }
+        let tracks = open_from(text.as_bytes(), Path::new("a.csv"), ReadOptions::default(), usize::MAX);
+        tracks.unwrap().collect_all().unwrap().continuity
+    }
+
+    #[test]
+    fn lane_changes_at_the_ends_of_tracks_are_counted_and_many_are_in_doubt() {
+        for cut in [read(|frame| frame >= 48), read(|frame| frame < 52), read(|frame| (46..52).contains(&frame))] {
+            assert_eq!((cut.recorded_crossings, cut.edge_crossings, cut.split_crossings), (5, 5, 0));
+            assert!(
+                cut.hides_lane_changes() && cut.warnings()[0].starts_with("5 of 5 changes"),
+                "{:?}",
+                cut.warnings()
+            );
+        }
+        for whole in [read(|_| true), read(|frame| frame >= 45), read(|frame| frame < 55)] {
+            assert_eq!((whole.recorded_crossings, whole.edge_crossings, whole.split_crossings), (5, 0, 0));
+            assert!(!whole.hides_lane_changes() && whole.warnings().is_empty(), "{:?}", whole.warnings());
+        }
+    }
+
+    #[test]
+    fn lane_changes_beside_a_gap_are_counted() {
+        // The gap begins 0.2 s after the change, or ends 0.2 s before it.
+        for cut in [read(|frame| !(52..62).contains(&frame)), read(|frame| !(38..48).contains(&frame))] {
+            assert_eq!((cut.pieces, cut.edge_crossings, cut.split_crossings, cut.hidden_crossings), (10, 0, 5, 0));
+            assert!(cut.hides_lane_changes());
+            assert!(
+                cut.warnings().iter().any(|warning| warning.contains("before or after a gap")),
+                "{:?}",
+                cut.warnings()
+            );
+        }
+        for beside in [read(|frame| !(55..65).contains(&frame)), read(|frame| !(35..45).contains(&frame))] {
+            assert_eq!((beside.pieces, beside.split_crossings, beside.hidden_crossings), (10, 0, 0));
+            assert!(!beside.hides_lane_changes(), "{:?}", beside.warnings());
+        }
+        // A gap of 0.2 s is bridged.
+        assert_eq!(read(|frame| !(52..54).contains(&frame)).split_crossings, 0);
+    }
+
+    #[test]
+    fn few_lane_changes_at_the_ends_of_tracks_are_in_no_doubt() {
+        let edge = |recorded_crossings, edge_crossings| {
+            Continuity { recorded_crossings, edge_crossings, ..Continuity::default() }.hides_lane_changes()
+        };
+        assert!(!edge(2, 2) && edge(3, 3) && !edge(9, 3) && edge(8, 3) && !edge(28, 4));
+    }
 }

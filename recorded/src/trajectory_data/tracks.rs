@@ -255,7 +255,13 @@ impl<'a> Tracks<'a> {
     pub fn continuity(&self) -> Continuity {
         let continuity = self.builder.continuity();
         match self.lanes() {
-            LaneReliability::Unreliable => Continuity { recorded_crossings: 0, hidden_crossings: 0, ..continuity },
+            LaneReliability::Unreliable => Continuity {
+                recorded_crossings: 0,
+                hidden_crossings: 0,
+                split_crossings: 0,
+                edge_crossings: 0,
+                ..continuity
+            },
             LaneReliability::Reliable | LaneReliability::Estimated => continuity,
         }
     }
