@@ -470,12 +470,14 @@ pub enum TrajectoryFileProblem {
     },
     /// Columns that the reader only checks contradict the lateral position.
     #[error(
-        "`{columns}` contradict `d_m`: in {percent:.0} % of {compared}, they say left where `d_m` says right, or the reverse; \
-         one of both points to the other side"
+        "`{columns}` contradict `{position}`: in {percent:.0} % of {compared}, they say left where `{position}` says right, or the \
+         reverse; one of both points to the other side"
     )]
     SidesContradict {
         /// The columns.
         columns: &'static str,
+        /// The column of the lateral position.
+        position: &'static str,
         /// Share of the comparisons that contradict (%).
         percent: f64,
         /// What is compared.

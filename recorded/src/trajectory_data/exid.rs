@@ -12,7 +12,8 @@
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
 //! another format. The reader therefore infers the road from the traffic before it reads the rows;
 //! see `inferred_road`. Lanelets that follow one another are one lane; see `stated_lanes`. A vehicle
-//! changes its lane where `laneChange` is 1, or where its offset from the lane's centre jumps.
+//! changes its lane where `laneChange` is 1, or where its offset from the lane's centre jumps. The
+//! offset also shows whether the positions are mirrored; see `orientation`.
 //!
 //! **inD, rounD.** Their columns are the first ones of exiD's. They record intersections and
 //! roundabouts, which are no roads with lanes: they are read with a warning, or refused if most
@@ -35,6 +36,7 @@ use super::highd::{SPEED_MPS, check_row_counts};
 use super::inferred_road::{InferredRoad, Placed, Pose};
 use super::input::{Digest, open_file, with_path};
 use super::markings::DEFAULT_LANE_WIDTH_M;
+use super::orientation::{LaneOffset, OffsetSides};
 use super::plain::allowed;
 use super::reference_line::Point;
 use super::rows::{Fields, Lines, Separator};
@@ -96,6 +98,12 @@ impl ColumnIndices {
         Some(StatedLane { edge: lanelet, index: None })
     }
 
+    /// Returns the offset of a vehicle from the centre of its lane (m).
+    fn offset_m(&self, line: &str, fields: &Fields) -> Option<f64> {
+        let offset_m: f64 = first_of(fields.get(line, self.lane_offset?)).parse().ok()?;
+        offset_m.is_finite().then_some(offset_m)
+    }
+
     /// Returns the vehicle number, the position and the heading (rad) of a row.
     fn pose(&self, line: &str, fields: &Fields) -> Result<(u64, Point, f64), FieldError> {
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
@@ -115,6 +123,7 @@ pub(super) struct ExidColumns {
     road: InferredRoad,
     /// The vehicle of the previous row and the index of its direction.
     latest: Option<(u64, usize)>,
+    sides: OffsetSides,
 }
 
 impl ExidColumns {
@@ -131,6 +140,7 @@ impl ExidColumns {
             meta_file: file,
             road,
             latest: None,
+            sides: OffsetSides::default(),
             unknown_classes,
         })
     }
@@ -148,7 +158,7 @@ pub(super) fn road_from_traffic(path: &Path) -> Result<InferredRoad, TrajectoryF
             let Ok((vehicle, point, heading_rad)) = columns.pose(line, fields) else { return };
             let field = |column: Option<usize>| first_of(column.map_or("", |index| fields.get(line, index)));
             let lane_width_m = number(field(columns.lane_width), "laneWidth", LANE_WIDTH_M).ok();
-            let offset_m = field(columns.lane_offset).parse::<f64>().ok().filter(|offset_m| offset_m.is_finite());
+            let offset_m = columns.offset_m(line, fields);
             // The flag alone does not tell: in some files it is 0 throughout. The offset from the
             // centre of the lane jumps where a vehicle enters the next one.
             let before_m = latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
@@ -232,6 +242,10 @@ impl TextLayout for ExidColumns {
         self.road.is_in_doubt()
     }
 
+    fn check_sides(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
+        self.sides.check(is_mirrored)
+    }
+
     fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
         self.columns.data.map(|index| ("recordingId", fields.get(line, index)))
     }
@@ -254,6 +268,9 @@ impl TextLayout for ExidColumns {
         self.latest = Some((track, index));
         let named_lane = self.columns.named_lane(line, fields);
         let Some(Placed { s_m, d_m, lane }) = self.road.place(index, point, named_lane) else { return Ok(None) };
+        if let Some(offset_m) = self.columns.offset_m(line, fields) {
+            self.sides.add(LaneOffset { vehicle: track, d_m, offset_m });
+        }
         let frame = integer(fields.get(line, self.columns.frame), "frame", allowed::FRAMES)?;
         Ok(Some(Row {
             number: track,

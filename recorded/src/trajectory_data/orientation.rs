@@ -1,8 +1,9 @@
-//! Checks whether a heading and a position in the plane, which some files state besides the
-//! position on the road, agree with the lateral position.
+//! Checks whether a heading, a position in the plane or an offset in the lane, which some files state
+//! besides the position, agree with the lateral position.
 //!
 //! | column | convention | compared with |
 //! |---|---|---|
+//! | `latLaneCenterOffset` (exiD) | positive to the left: it falls in lane changes to the right | the lateral movement of a vehicle from row to row |
 //! | `heading_rel_rad` | positive to the left | the lateral movement of a vehicle from row to row |
 //! | `x_m`, `y_m` | y is to the left of x | the side on which vehicles at the same place of the road are |
 //!
@@ -33,6 +34,10 @@ const LEAST_PAIRS: f64 = 20.0;
 /// Share of the evidence above which the columns contradict (-). In the windows of US-101, columns that
 /// agree reach 0.05.
 const CONTRADICTED_SHARE: f64 = 0.75;
+
+/// Largest change of an offset between two rows that is a movement (m): where a vehicle enters another
+/// lane, the offset jumps by a lane width.
+const LARGEST_MOVEMENT_M: f64 = 1.0;
 
 /// One row, as the file states it: `d_m` is positive to the right.
 #[derive(Clone, Copy, Debug)]
@@ -118,11 +123,21 @@ impl Orientation {
     pub(super) fn check(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
         if let Some(percent) = self.heading.contradiction(is_mirrored, LEAST_EVIDENCE_M) {
             let compared = "the lateral movement";
-            return Err(TrajectoryFileProblem::SidesContradict { columns: "heading_rel_rad", percent, compared });
+            return Err(TrajectoryFileProblem::SidesContradict {
+                columns: "heading_rel_rad",
+                position: "d_m",
+                percent,
+                compared,
+            });
         }
         if let Some(percent) = self.plane().contradiction(is_mirrored, LEAST_PAIRS) {
             let compared = "the vehicles beside each other";
-            return Err(TrajectoryFileProblem::SidesContradict { columns: "x_m, y_m", percent, compared });
+            return Err(TrajectoryFileProblem::SidesContradict {
+                columns: "x_m, y_m",
+                position: "d_m",
+                percent,
+                compared,
+            });
         }
         Ok(())
     }
@@ -146,9 +161,80 @@ impl Orientation {
     }
 }
 
+/// The lateral position of a vehicle, and its offset from the centre of its lane (m), both positive to
+/// the left.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LaneOffset {
+    pub(super) vehicle: u64,
+    pub(super) d_m: f64,
+    pub(super) offset_m: f64,
+}
+
+/// What the offsets of the rows so far say of the sides. The rows of a vehicle follow one another.
+#[derive(Debug, Default)]
+pub(super) struct OffsetSides {
+    latest: Option<LaneOffset>,
+    evidence: Evidence,
+}
+
+impl OffsetSides {
+    /// Adds a row.
+    pub(super) fn add(&mut self, row: LaneOffset) {
+        let before = self.latest.replace(row).filter(|before| before.vehicle == row.vehicle);
+        let Some(before) = before else { return };
+        let (moved_m, changed_m) = (row.d_m - before.d_m, row.offset_m - before.offset_m);
+        let is_movement = |m: f64| (LEAST_MOVEMENT_M..LARGEST_MOVEMENT_M).contains(&m.abs());
+        if is_movement(moved_m) && is_movement(changed_m) {
+            self.evidence.add(moved_m * changed_m > 0.0, moved_m.abs());
+        }
+    }
+
+    /// Checks the rows so far; the lateral position is read as mirrored if `is_mirrored`.
+    ///
+    /// # Errors
+    /// The offsets contradict the positions.
+    pub(super) fn check(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
+        match self.evidence.contradiction(is_mirrored, LEAST_EVIDENCE_M) {
+            Some(percent) => Err(TrajectoryFileProblem::SidesContradict {
+                columns: "latLaneCenterOffset",
+                position: "yCenter",
+                percent,
+                compared: "the lateral movement",
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn offsets_contradict_a_mirrored_position_and_jumps_of_the_lane_count_for_nothing() {
+        // Ten vehicles move by a lane to the left, in steps of 5 cm; halfway, the offset jumps back.
+        let moved = |sign: f64| {
+            let mut sides = OffsetSides::default();
+            for vehicle in 0..10 {
+                for step in 0..70_u32 {
+                    let left_m = 0.05 * f64::from(step);
+                    let offset_m = if step < 35 { left_m } else { left_m - 3.5 };
+                    sides.add(LaneOffset { vehicle, d_m: sign * left_m, offset_m });
+                }
+            }
+            sides
+        };
+        assert!(moved(1.0).check(false).is_ok() && moved(-1.0).check(true).is_ok());
+        for (sign, is_mirrored) in [(-1.0, false), (1.0, true)] {
+            let message = moved(sign).check(is_mirrored).unwrap_err().to_string();
+            assert!(message.contains("`latLaneCenterOffset` contradict `yCenter`"), "{message}");
+        }
+        let mut constant = OffsetSides::default();
+        for step in 0..1_000_u32 {
+            constant.add(LaneOffset { vehicle: 1, d_m: -0.05 * f64::from(step), offset_m: 0.1 });
+        }
+        assert!(constant.check(false).is_ok());
+    }
 
     /// Three vehicles in three lanes on a road towards the north-west; the second one changes lanes.
     fn recorded(heading_sign: f64, plane_sign: f64) -> Orientation {

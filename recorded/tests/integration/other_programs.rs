@@ -762,6 +762,33 @@ fn a_lane_change_that_exid_does_not_flag_is_found_and_makes_no_others() {
 }
 
 #[test]
+fn a_mirrored_data_set_of_exid_is_refused_and_the_named_options_mend_it() {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &[], true);
+    let path = folder.path().join("05_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mirrored = text.lines().enumerate().map(|(number, line)| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if number > 0 {
+            fields[4] = format!("{:.3}", -fields[4].parse::<f64>().unwrap());
+        }
+        fields.join(",") + "\n"
+    });
+    std::fs::write(&path, mirrored.collect::<String>()).unwrap();
+    let error = read(folder.path()).unwrap_err();
+    assert_mentions(&error, &["05_tracks.csv", "`latLaneCenterOffset` contradict `yCenter`"], "mirrored");
+    let axes = AxisOptions { mirror_d: true, lanes_from_right: true, ..AxisOptions::default() };
+    let data = read_with(folder.path(), ReadOptions { axes, ..ReadOptions::default() }).unwrap();
+    let changes = detect(&smooth(&data));
+    let listed: Vec<_> = changes.iter().map(|change| (change.track_id, change.direction)).collect();
+    assert_eq!(listed, [(2, Side::Left)]);
+    // The options do not pass on a data set that is as it should be.
+    exid(folder.path(), &[], true);
+    let axes = AxisOptions { mirror_d: true, lanes_from_right: true, ..AxisOptions::default() };
+    assert!(read_with(folder.path(), ReadOptions { axes, ..ReadOptions::default() }).is_err());
+}
+
+#[test]
 fn urban_recordings_are_not_read_without_a_word() {
     let folder = tempfile::tempdir().unwrap();
     exid(folder.path(), &["latLaneCenterOffset", "laneWidth", "laneletId", "laneChange"], false);
