@@ -144,6 +144,10 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
     }
     assert_eq!((samples, carriageways.len()), (120, 2));
     assert!(engaged > 0 && page.contains(&format!("the system engages in {engaged} of 120 samples")), "{engaged}");
+    // The choice is also in the summary.
+    let summary = fs::read_to_string(out.join("summary.md")).unwrap();
+    let chosen = format!("{} overtake a vehicle, and 6 became scenarios", report["origins"]["approaches"]);
+    assert!(summary.contains(&chosen), "{summary}");
     // The folder is a campaign's folder.
     stdout(&closecall(["check", out.to_str().unwrap()]), 0);
     stdout(&closecall(["check", out.join("scenarios").to_str().unwrap()]), 0);

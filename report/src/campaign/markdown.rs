@@ -5,6 +5,7 @@ use std::path::Path;
 use super::coverage::line;
 use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
+use super::origins::Origins;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use super::recordings::card_beside;
 use super::text::{goals, imposed, not_prevented};
@@ -43,6 +44,9 @@ pub fn markdown(findings: &Findings<'_>) -> String {
             "- {verdict}: {scenario}, sample {sample}: {} ([incident card]({card}))\n",
             cell(&still.sentence)
         ));
+    }
+    if let Some(origins) = findings.folder.and_then(Origins::of) {
+        text.push_str(&format!("- {}\n", plain(&origins.choice_sentence())));
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));

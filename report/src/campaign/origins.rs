@@ -109,6 +109,24 @@ impl Origins {
         })
     }
 
+    /// Returns how many lane changes became scenarios, and why the others did not, the most frequent reason
+    /// first.
+    pub fn choice_sentence(&self) -> String {
+        let changes: usize = self.files.iter().map(|file| file.lane_changes).sum();
+        let mut refused: Vec<(&String, usize)> = self.refused.iter().map(|(reason, count)| (reason, *count)).collect();
+        refused.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let refused: Vec<String> = refused.iter().map(|(reason, count)| format!("{reason} ({count})")).collect();
+        let refused = match refused.is_empty() {
+            true => String::new(),
+            false => format!("; lane changes that are no encounter: {}", refused.join("; ")),
+        };
+        let (approaches, encounters) = (self.approaches, self.encounters.len());
+        format!(
+            "of {}, {approaches} overtake a vehicle, and {encounters} became scenarios{refused}",
+            counted(changes, "lane change")
+        )
+    }
+
     /// Returns the engagements of all encounters together; `None` before the campaign is over.
     pub fn engagement(&self) -> Option<Engagement> {
         let mut sum = Engagement::default();
@@ -171,6 +189,7 @@ impl fmt::Display for OriginsText<'_> {
                 origin.reason().map_or("-", |(reason, _)| reason),
             )?;
         }
+        writeln!(f, "{}", self.origins.choice_sentence())?;
         self.origins.engagement().map_or(Ok(()), |all| writeln!(f, "{}", engaged_sentence(&all)))
     }
 }
@@ -343,5 +362,29 @@ fn fate_of(findings: &Findings<'_>, scenario: &str, sample: u64) -> &'static str
             None => "no outcome",
         },
         _ => "one controller",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reasons_against_lane_changes_are_named_the_most_frequent_first() {
+        let file = |lane_changes| OriginFile { lane_changes, ..OriginFile::default() };
+        let chosen = Origins {
+            files: vec![file(20), file(13)],
+            approaches: 18,
+            refused: [("no vehicle ahead".to_owned(), 5), ("too slow".to_owned(), 10)].into(),
+            encounters: vec![Origin::default(), Origin::default()],
+            ..Origins::default()
+        };
+        assert_eq!(
+            chosen.choice_sentence(),
+            "of 33 lane changes, 18 overtake a vehicle, and 2 became scenarios; lane changes that are no encounter: too slow (10); \
+             no vehicle ahead (5)"
+        );
+        let all = Origins { refused: BTreeMap::new(), ..chosen };
+        assert!(all.choice_sentence().ends_with("became scenarios"));
     }
 }
