@@ -35,6 +35,11 @@ const MISPLACED_M: f64 = 0.5;
 const WARNED_SHARE: f64 = 0.05;
 const REFUSED_SHARE: f64 = 0.2;
 
+/// Median distance of the vehicles of a carriageway from the middles of their lanes above which a reader
+/// of results is warned (m): a quarter of a lane. Drivers keep to the middle within a few decimetres. An
+/// assumption with a plausible range of 0.6 to 1.2 m.
+const SHIFTED_M: f64 = 0.9;
+
 /// Distance to the left of its carriageway beyond which a vehicle is on another road (m): more than a
 /// narrow shoulder beside the median. An assumption with a plausible range of 1 to 3 m.
 const OUTSIDE_LEFT_M: f64 = 2.0;
@@ -183,22 +188,29 @@ pub(super) fn check_carriageways(rows: &[Row], markings: &LaneMarkings) -> Resul
 }
 
 /// Rejects rows in which many vehicles are not between the markings of their lane. Returns a warning
-/// if some are not. To the side of a carriageway, a vehicle counts as being in the lane at its edge.
+/// if some are not, or if most drive beside the middles of their lanes. To the side of a carriageway, a
+/// vehicle counts as being in the lane at its edge.
 pub(super) fn check_markings(rows: &[Row], markings: &LaneMarkings) -> Result<Option<String>, ReadError> {
     let mut warning = None;
     for road in markings.carriageways() {
         let MarkedCarriageway { first, last, .. } = road;
         let (mut misplaced, mut all) = (0_usize, 0_usize);
+        let mut offsets_m = Vec::new();
         for row in rows.iter().filter(|row| road.holds(row.lane)) {
             let (left, right) = (markings.left_edge_m(Lane(row.lane)), markings.right_edge_m(Lane(row.lane)));
             let Some((left_m, right_m)) = left.zip(right) else { continue };
             let is_too_far_left = row.lane > first && row.d_m > left_m + MISPLACED_M;
             let is_too_far_right = row.lane < last && row.d_m < right_m - MISPLACED_M;
             misplaced += usize::from(is_too_far_left || is_too_far_right);
+            offsets_m.push(row.d_m - 0.5 * (left_m + right_m));
             all += 1;
         }
         let share = misplaced as f64 / all.max(1) as f64;
-        if all < LEAST_ROWS || share <= WARNED_SHARE {
+        if all < LEAST_ROWS {
+            continue;
+        }
+        if share <= WARNED_SHARE {
+            warning = warning.or(shifted([first, last], median(offsets_m)));
             continue;
         }
         let problem = TrajectoryFileProblem::LanesBesideMarkings { lanes: [first, last], percent: 100.0 * share };
@@ -208,6 +220,21 @@ pub(super) fn check_markings(rows: &[Row], markings: &LaneMarkings) -> Result<Op
         warning = warning.or(Some(problem.to_string()));
     }
     Ok(warning)
+}
+
+/// Returns the warning for vehicles in `lanes` that drive `shift_m` to the left of the middles, if that is
+/// far.
+fn shifted(lanes: [u8; 2], shift_m: f64) -> Option<String> {
+    let side = if shift_m > 0.0 { "left" } else { "right" };
+    (shift_m.abs() > SHIFTED_M).then(|| {
+        format!(
+            "on the carriageway with the lanes {} to {}, vehicles drive {:.1} m to the {side} of the middles of their lanes, as the median: \
+             the lane markings or the positions are wrong",
+            lanes[0],
+            lanes[1],
+            shift_m.abs()
+        )
+    })
 }
 
 #[cfg(test)]

@@ -537,6 +537,20 @@ pub enum TrajectoryFileProblem {
         /// Range of plausible values.
         allowed: &'static str,
     },
+    /// The distances between two frames contradict the speeds, which points to mixed-up units or columns,
+    /// or to a wrong clock.
+    #[error(
+        "the median distance between two frames, as a share of what the recorded speed makes, is {ratio:.3}, but {allowed} is plausible: \
+         are units or columns mixed up, or is {clock} wrong?"
+    )]
+    ImplausibleSteps {
+        /// The share (-).
+        ratio: f64,
+        /// Range of plausible values.
+        allowed: &'static str,
+        /// What states the times of frames.
+        clock: &'static str,
+    },
     /// Vehicles of highD drive against the driving direction that the metadata states.
     #[error(
         "in {percent:.0} % of the rows with drivingDirection {direction} in {file}, `xVelocity` is not towards {towards}: the driving \

@@ -56,6 +56,13 @@ impl Bounds {
     }
 }
 
+/// Returns a number as an error message shows it: with an exponent if it has many digits.
+pub(super) fn shown(value: f64) -> String {
+    /// The largest number that is written with all of its digits.
+    const LONGEST: f64 = 1e15;
+    if value.abs() > LONGEST { format!("{value:e}") } else { value.to_string() }
+}
+
 /// Maximum length of a wrong field's text that an error message repeats (characters).
 const MAX_SHOWN_CHARS: usize = 40;
 

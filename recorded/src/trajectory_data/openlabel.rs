@@ -27,7 +27,7 @@ use super::class_names::UnknownClasses;
 use super::collected::{Collected, CollectedRow, CollectedSource, Facts, Position, distinct_numbers};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
-use super::fields::Bounds;
+use super::fields::{Bounds, shown};
 use super::file_layout::Layout;
 use super::json_input::JsonInput;
 use super::markings::LaneMarkings;
@@ -166,12 +166,13 @@ impl<'t> Times<'t> {
         let of_period = metadata.and_then(|metadata| metadata.frame_period_s);
         if let Some(period_s) = of_period.filter(|period_s| !PERIOD_S.contains(*period_s)) {
             return Err(refused(format!(
-                "`openlabel.metadata.frame_period_s` is {period_s}, but 0.001 to 100 s is needed"
+                "`openlabel.metadata.frame_period_s` is {}, but 0.001 to 100 s is needed",
+                shown(period_s)
             )));
         }
         let rate_hz = metadata.and_then(|metadata| metadata.frame_rate).or(text.stream_rate);
         if let Some(rate_hz) = rate_hz.filter(|rate_hz| !RATE_HZ.contains(*rate_hz)) {
-            return Err(refused(format!("`frame_rate` is {rate_hz}, but 0.01 to 1000 Hz is needed")));
+            return Err(refused(format!("`frame_rate` is {}, but 0.01 to 1000 Hz is needed", shown(rate_hz))));
         }
         Ok(Self { timestamps: &text.timestamps, period_s: of_period.or(rate_hz.map(|rate_hz| 1.0 / rate_hz)) })
     }
@@ -200,7 +201,7 @@ impl<'t> Times<'t> {
         };
         time.ok_or_else(|| {
             let actual = match stated {
-                Some(Timestamp::Seconds(seconds)) => format!("{seconds:?}"),
+                Some(Timestamp::Seconds(seconds)) => shown(*seconds),
                 Some(Timestamp::Text(text)) => format!("\"{}\"", text.chars().take(40).collect::<String>()),
                 None => format!("missing, and frame {frame} of `frame_rate` is outside of the allowed times"),
             };
@@ -252,7 +253,7 @@ fn checked(path: &str, name: &str, value: f64, bounds: Bounds) -> Result<f64, Re
     if bounds.contains(value) {
         return Ok(value);
     }
-    Err(refused(format!("{name} of `{path}` is {value}, but {} is needed", bounds.describe("a number"))))
+    Err(refused(format!("{name} of `{path}` is {}, but {} is needed", shown(value), bounds.describe("a number"))))
 }
 
 /// Checks a whole number of a vehicle or a lane.
@@ -262,7 +263,7 @@ fn whole(path: &str, name: &str, value: f64, high: f64) -> Result<u64, ReadError
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number in bounds")]
         return Ok(value as u64);
     }
-    Err(refused(format!("{name} of `{path}` is {value}, but {} is needed", bounds.describe("a whole number"))))
+    Err(refused(format!("{name} of `{path}` is {}, but {} is needed", shown(value), bounds.describe("a whole number"))))
 }
 
 /// Returns the lane with a number.

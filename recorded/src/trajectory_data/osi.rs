@@ -25,7 +25,7 @@ use super::class_names::{UnknownClass, UnknownClasses};
 use super::collected::{Collected, CollectedRow, Facts, Position};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
-use super::fields::Bounds;
+use super::fields::{Bounds, shown};
 use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
 use super::osi_messages::{Messages, refused};
@@ -160,7 +160,11 @@ fn observed(
         if bounds.contains(value) {
             return Ok(value);
         }
-        Err(refused(format!("{place}: `base.{name}` is {value}, but {} is needed", bounds.describe("a number"))))
+        Err(refused(format!(
+            "{place}: `base.{name}` is {}, but {} is needed",
+            shown(value),
+            bounds.describe("a number")
+        )))
     };
     let vector = |name: &str, vector: Option<&Vector3d>, bounds: Bounds| -> Result<Point, ReadError> {
         let part = |part: &str, value: fn(&Vector3d) -> Option<f64>| {

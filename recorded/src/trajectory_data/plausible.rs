@@ -13,6 +13,7 @@
 
 use std::collections::BTreeMap;
 
+use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::continuity::{FrameClock, is_jump};
@@ -73,14 +74,22 @@ pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(
 /// Rejects steps of moving vehicles that contradict the recorded speeds.
 fn check_steps(steps: Vec<RoadStep>, layout: Layout) -> Result<(), ReadError> {
     check_direction(&steps)?;
-    let steps = steps.into_iter().map(|step| (step.ratio, step.line)).collect();
-    let quantity = "the median distance between two frames, as a share of what the recorded speed makes,";
+    let ratios: Vec<f64> = steps.into_iter().map(|step| step.ratio).collect();
     // A simulation has no noise: km/h and mph, which differ by 1.6, can be told apart.
     let (range, allowed) = match layout {
         Layout::Sumo | Layout::Vissim => ((0.8, 1.25), "0.8 to 1.25"),
         _ => ((0.6, 1.6), "0.6 to 1.6"),
     };
-    check_median(steps, Plausible { quantity, unit: "", range, allowed })
+    let clock = match layout {
+        Layout::Highd | Layout::Exid => "`frameRate`, in Hz,",
+        Layout::Plain | Layout::InCar => "`time_s`, in seconds,",
+        _ => "the time between two frames",
+    };
+    let ratio = median(ratios);
+    if ratio >= range.0 && ratio <= range.1 {
+        return Ok(());
+    }
+    Err(ReadError::of_file(TrajectoryFileProblem::ImplausibleSteps { ratio, allowed, clock }))
 }
 
 /// Rejects steps that lead backwards: traffic of the other carriageway, or a reversed axis.

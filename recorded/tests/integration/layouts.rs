@@ -209,6 +209,32 @@ fn lane_numbers_of_highd_that_do_not_fit_its_markings_are_refused() {
 }
 
 #[test]
+fn markings_of_highd_beside_its_traffic_and_a_wrong_frame_rate_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let is_shifted = |note: &String| note.contains("1.5 m to the right of the middles of their lanes");
+    let clean = read(folder.path()).unwrap();
+    assert!(!clean.notes.iter().any(|note| note.contains("middles")), "{:?}", clean.notes);
+    // The lower carriageway lies 1.5 m further to the right, still within the markings of its lane.
+    rewrite_rows(folder.path(), |fields| {
+        if fields[1] == "2" {
+            fields[3] = format!("{}", fields[3].parse::<f64>().unwrap() + 1.5);
+        }
+    });
+    let shifted = read(folder.path()).unwrap();
+    assert!(shifted.notes.iter().any(is_shifted), "{:?}", shifted.notes);
+    write_both_ways(folder.path());
+    let path = folder.path().join("07_recordingMeta.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("7,25,", "7,10,")).unwrap();
+    let message = read(folder.path()).unwrap_err().to_string();
+    assert!(
+        message.contains("as a share of what the recorded speed makes") && message.contains("`frameRate`"),
+        "{message}"
+    );
+}
+
+#[test]
 fn highd_traffic_beside_its_carriageway_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());

@@ -26,8 +26,9 @@ pub(crate) fn drive(edit: impl Fn(&mut [f64; 6])) -> String {
 fn mixed_up_units_and_columns_are_detected() {
     const FEET_PER_M: f64 = 1.0 / 0.3048;
     assert!(read_text(drive(|_| {}).as_bytes()).is_ok());
-    let steps = ["line", "the median distance between two frames", "units or columns"];
-    let cases: [(&str, String, &[&str]); 9] = [
+    let steps = ["the median distance between two frames", "units or columns", "`time_s`, in seconds, wrong"];
+    let cases: [(&str, String, &[&str]); 10] = [
+        ("times in milliseconds", drive(|at| at[0] *= 1_000.0), &steps),
         ("km/h", drive(|at| at[3] *= 3.6), &steps),
         ("mph", drive(|at| at[3] *= 2.237), &steps),
         ("ft/s", drive(|at| at[3] *= FEET_PER_M), &steps),
