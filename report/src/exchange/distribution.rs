@@ -72,11 +72,11 @@ fn distribution(name: &ParameterName, config: &ParameterConfig) -> Option<Elemen
 /// before truncation, and not to the logarithm: m·exp(σ²/2) and (exp(σ²) − 1)·exp(σ²)·m² for a
 /// median m.
 fn log_normal_element(config: &LogNormalConfig) -> Option<Element> {
-    let growth = maths::exp(config.sigma * config.sigma);
-    let expected = config.median * growth.sqrt();
+    let spread = maths::exp_m1(config.sigma * config.sigma);
+    let expected = config.median * (1.0 + spread).sqrt();
     let element = Element::new("LogNormalDistribution")
         .with("expectedValue", expected)
-        .with("variance", (growth - 1.0) * expected * expected);
+        .with("variance", spread * expected * expected);
     // A range has both limits. If one limit is open, its probability of 10⁻¹⁶ bounds the
     // distribution.
     let [low, high] = Distribution::log_normal(config).ok()?.bounds()?;
