@@ -34,8 +34,8 @@ pub(super) struct ImportArgs {
     /// Value of a parameter of the file, instead of its default; can be given more than once
     #[arg(long = "parameter", value_name = "NAME=VALUE", value_parser = parameter, help_heading = heading::SCENARIO)]
     parameters: Vec<(String, String)>,
-    /// Number of the value set to use, from 1, if the file holds values of the parameters of a
-    /// scenario
+    /// Number of the value set or of the draw to use, from 1, if the file holds values or
+    /// distributions of the parameters of a scenario
     #[arg(long, value_name = "N", help_heading = heading::SCENARIO)]
     value_set: Option<u64>,
 }

@@ -1,17 +1,20 @@
 //! A file of parameter values for a scenario: `ParameterValueDistribution`.
 //!
 //! ```text
-//!  values.xosc ─▶ combinations of values, numbered from 1 ─▶ one of them ─▶ scenario that the file names
+//!  Deterministic ─▶ combinations of values, numbered from 1 ─┬─▶ one of them ─▶ scenario that the file names
+//!  Stochastic ────▶ draws of values, numbered from 1 ────────┘
 //! ```
 //!
 //! A scenario file holds the times of one play of the storyboard, which depend on the values. One
 //! import therefore uses one combination. The values of the last distribution of the file change
 //! fastest.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::dom::{ImportError, Node};
 use super::reader::Reader;
+use super::stochastic::{self, Stochastic};
 use super::structure::Given;
 
 /// Largest number of values of one range.
@@ -24,27 +27,68 @@ const ROUNDING: f64 = 1e-9;
 pub(super) struct ValueFile {
     /// The scenario that it names.
     pub(super) scenario: PathBuf,
+    pub(super) values: ValueSource,
+}
+
+/// Where the values of a file come from.
+#[derive(Clone, Debug)]
+pub(super) enum ValueSource {
     /// The alternatives of each distribution, of which a combination has one.
-    distributions: Vec<Vec<Given>>,
+    Deterministic(Vec<Vec<Given>>),
+    /// Distributions, from which values are drawn.
+    Stochastic(Stochastic),
 }
 
 impl ValueFile {
-    /// Returns the number of combinations.
+    /// Returns the number of combinations or draws.
     pub(super) fn count(&self) -> u64 {
-        self.distributions.iter().fold(1, |count: u64, alternatives| count.saturating_mul(alternatives.len() as u64))
+        match &self.values {
+            ValueSource::Deterministic(distributions) => {
+                distributions.iter().fold(1, |count: u64, alternatives| count.saturating_mul(alternatives.len() as u64))
+            }
+            ValueSource::Stochastic(stochastic) => stochastic.runs,
+        }
     }
 
-    /// Returns the values of a combination. `number` is from 1 to [`ValueFile::count`].
+    /// Returns the values of a combination or of a draw. `number` is from 1 to
+    /// [`ValueFile::count`].
     pub(super) fn combination(&self, number: u64) -> Given {
+        let distributions = match &self.values {
+            ValueSource::Deterministic(distributions) => distributions,
+            ValueSource::Stochastic(stochastic) => return stochastic.draw(number),
+        };
         let mut rest = number.saturating_sub(1);
         let mut values = Given::new();
-        for alternatives in self.distributions.iter().rev() {
+        for alternatives in distributions.iter().rev() {
             let count = alternatives.len() as u64;
             let index = usize::try_from(rest % count).unwrap_or_default();
             rest /= count;
             values.extend(alternatives[index].clone());
         }
         values
+    }
+
+    /// Returns what a number chooses, in the plural.
+    pub(super) const fn plural(&self) -> &'static str {
+        match &self.values {
+            ValueSource::Deterministic(_) => "combinations of values",
+            ValueSource::Stochastic(_) => "draws of values",
+        }
+    }
+
+    /// Returns what the values of a number are, for a note.
+    pub(super) fn description(&self, number: u64) -> String {
+        let count = self.count();
+        match &self.values {
+            ValueSource::Deterministic(_) => format!("value set {number} of {count}"),
+            ValueSource::Stochastic(stochastic) => {
+                let seed = match stochastic.seed {
+                    Some(seed) => format!("the random seed {seed}"),
+                    None => "no stated random seed, which is taken as 0".to_owned(),
+                };
+                format!("draw {number} of {count} with {seed}")
+            }
+        }
     }
 }
 
@@ -59,13 +103,23 @@ pub(super) fn read(reader: &Reader, root: &Node, distribution: &Node) -> Result<
         return Err(reader.error(other, format!("a file of values has nothing beside `{}`", distribution.name)));
     }
     let scenario = reader.path_in(reader.child(distribution, &["ScenarioFile"])?, "filepath")?;
-    if let Some(stochastic) = distribution.child("Stochastic") {
-        let message = "a scenario file has the times of one play of the storyboard, and no distribution of values: \
-                       import the scenario that this file names, and give each value";
-        return Err(reader.error(stochastic, message));
-    }
+    let values = match (distribution.child("Stochastic"), distribution.child("Deterministic")) {
+        (Some(stochastic), None) => ValueSource::Stochastic(stochastic::read(reader, stochastic)?),
+        (Some(stochastic), Some(_)) => {
+            return Err(reader.error(stochastic, "it stands beside `Deterministic`: a file must have one of them"));
+        }
+        (None, _) => {
+            ValueSource::Deterministic(deterministic(reader, reader.child(distribution, &["Deterministic"])?)?)
+        }
+    };
+    Ok(ValueFile { scenario, values })
+}
+
+/// Returns the alternatives of each distribution.
+fn deterministic(reader: &Reader, node: &Node) -> Result<Vec<Vec<Given>>, ImportError> {
     let mut distributions = Vec::new();
-    for node in &reader.child(distribution, &["Deterministic"])?.children {
+    let mut stated: BTreeSet<String> = BTreeSet::new();
+    for node in &node.children {
         let alternatives = match node.name.as_str() {
             "DeterministicMultiParameterDistribution" => value_sets(reader, reader.only(node)?)?,
             _ => values(reader, node)?,
@@ -73,9 +127,15 @@ pub(super) fn read(reader: &Reader, root: &Node, distribution: &Node) -> Result<
         if alternatives.is_empty() {
             return Err(reader.error(node, "it has no value"));
         }
+        // One of two values of a parameter would be left out in silence.
+        let names: BTreeSet<String> = alternatives.iter().flat_map(Given::keys).cloned().collect();
+        if let Some(name) = names.intersection(&stated).next() {
+            return Err(reader.error(node, format!("a distribution before it has values of `{name}` already")));
+        }
+        stated.extend(names);
         distributions.push(alternatives);
     }
-    Ok(ValueFile { scenario, distributions })
+    Ok(distributions)
 }
 
 fn value_sets(reader: &Reader, node: &Node) -> Result<Vec<Given>, ImportError> {
@@ -99,7 +159,13 @@ fn values(reader: &Reader, node: &Node) -> Result<Vec<Given>, ImportError> {
     let inner = reader.only(node)?;
     let given = |value: String| Given::from([(name.clone(), value)]);
     match inner.name.as_str() {
-        "DistributionSet" => inner.all("Element").map(|element| reader.text(element, "value").map(&given)).collect(),
+        "DistributionSet" => inner
+            .all("Element")
+            .map(|element| match element.raw("weight") {
+                None => reader.text(element, "value").map(&given),
+                Some(_) => Err(reader.error(element, "`weight` is no attribute of a value of a `DistributionSet`")),
+            })
+            .collect(),
         "DistributionRange" => {
             let range = reader.child(inner, &["Range"])?;
             let (low, high) = (reader.number(range, "lowerLimit")?, reader.number(range, "upperLimit")?);
@@ -166,7 +232,20 @@ mod tests {
             single("a", &format!("<DistributionRange stepWidth=\"{step}\">{limits}</DistributionRange>"))
         };
         for (inner, word) in [
-            ("<Stochastic/>".to_owned(), "`Stochastic`: a scenario file has"),
+            ("<Stochastic/>".to_owned(), "`Stochastic`: it needs `numberOfTestRuns`"),
+            ("<Stochastic/><Deterministic/>".to_owned(), "`Stochastic`: it stands beside `Deterministic`"),
+            (String::new(), "it needs `Deterministic`"),
+            (
+                format!("<Deterministic>{}</Deterministic>", range("1", "2").repeat(2)),
+                "a distribution before it has values of `a` already",
+            ),
+            (
+                format!(
+                    "<Deterministic>{}</Deterministic>",
+                    single("a", "<DistributionSet><Element value=\"1\" weight=\"1\"/></DistributionSet>")
+                ),
+                "`Element`: `weight` is no attribute",
+            ),
             (format!("<Deterministic>{}</Deterministic>", range("0", "2")), "in steps of 0"),
             (format!("<Deterministic>{}</Deterministic>", range("-1", "2")), "in steps of -1"),
             (format!("<Deterministic>{}</Deterministic>", range("1", "0")), "from 1 to 0"),

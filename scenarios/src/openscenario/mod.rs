@@ -18,10 +18,13 @@ mod follow;
 mod formula;
 mod plane;
 mod reader;
+mod replaced;
 mod road;
 mod standard;
+mod stochastic;
 mod storyboard;
 mod structure;
+mod synchronize;
 mod trajectory;
 mod world;
 
@@ -34,11 +37,13 @@ use closecall_traffic::{Segment, input};
 
 pub use dom::ImportError;
 
+use self::distribution::ValueSource;
 use self::dom::{Node, parse};
 use self::entities::Entities;
 use self::formula::no_parameter;
 use self::reader::Reader;
 use self::road::{ImportedRoad, UsedRoad};
+use self::stochastic::Stochastic;
 use self::storyboard::Storyboard;
 use self::structure::Given;
 use self::world::Vehicle;
@@ -66,8 +71,9 @@ pub struct ImportOptions {
     pub ego: Option<String>,
     /// Values of parameters that replace the values of the file.
     pub parameters: Vec<(String, String)>,
-    /// Number of the combination of values to use, from 1, of a file that holds values of
-    /// parameters; `None` if it has one combination.
+    /// Number of the combination or of the draw of values to use, from 1, of a file that holds
+    /// values or distributions of parameters. `None` if it has one, or for the distributions
+    /// themselves if the scenario is one that Closecall wrote.
     pub value_set: Option<u64>,
 }
 
@@ -138,20 +144,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
 fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Imported, ImportFailure> {
     let distribution = reader.child(root, &["ParameterValueDistribution"])?;
     let file = distribution::read(reader, root, distribution)?;
-    let count = file.count();
-    let number = match options.value_set {
-        None if count == 1 => 1,
-        Some(number) if (1..=count).contains(&number) => number,
-        _ => {
-            let message = format!("it has {count} combinations of values: choose one value set from 1 to {count}");
-            return Err(reader.error(distribution, message).into());
-        }
-    };
-    let mut values = file.combination(number);
-    values.extend(options.parameters.iter().cloned());
-    let stated: Vec<_> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-    let note = format!("value set {number} of {count}: {}", stated.join(", "));
-    let scenario = Reader { path: file.scenario };
+    let scenario = Reader { path: file.scenario.clone() };
     let text = input::read_text(&scenario.path).map_err(|error| {
         let named = distribution.child("ScenarioFile").unwrap_or(distribution);
         reader.error(named, format!("failed to read {}: {error}", scenario.path.display()))
@@ -163,9 +156,32 @@ fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Im
             .error(inner, "a file of values must name a scenario, and this is a file of values")
             .into());
     }
+    if let (ValueSource::Stochastic(stochastic), None, Some(text)) =
+        (&file.values, options.value_set, text_of_closecall(&scenario_root))
+    {
+        return of_closecall(&scenario, &scenario_root, (text, options), Some((stochastic, reader.path.as_path())));
+    }
+    let count = file.count();
+    let number = match options.value_set {
+        None if count == 1 => 1,
+        Some(number) if (1..=count).contains(&number) => number,
+        _ => {
+            let message = format!("it has {count} {}: choose one value set from 1 to {count}", file.plural());
+            return Err(reader.error(distribution, message).into());
+        }
+    };
+    let mut values = file.combination(number);
+    values.extend(options.parameters.iter().cloned());
+    let stated: Vec<_> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let note = format!("{}: {}", file.description(number), stated.join(", "));
     let options = ImportOptions { ego: options.ego.clone(), parameters: values.into_iter().collect(), value_set: None };
     let mut imported = import_scenario(&scenario, scenario_root, &options)?;
-    imported.notes.insert(0, note);
+    let mut notes = vec![note];
+    if let ValueSource::Stochastic(stochastic) = file.values {
+        notes.extend(stochastic.notes);
+    }
+    notes.append(&mut imported.notes);
+    imported.notes = notes;
     Ok(imported)
 }
 
@@ -173,7 +189,7 @@ fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Im
 fn import_scenario(reader: &Reader, mut root: Node, options: &ImportOptions) -> Result<Imported, ImportFailure> {
     let path = &reader.path;
     if let Some(text) = text_of_closecall(&root) {
-        return of_closecall(reader, &root, (text, options));
+        return of_closecall(reader, &root, (text, options), None);
     }
     check_options(reader, &root, options)?;
     let mut notes = structure::check(path, &mut root, &options.parameters.iter().cloned().collect())?;
@@ -253,15 +269,17 @@ pub fn content_hash(text: &str) -> Option<String> {
 }
 
 /// Returns the scenario that Closecall wrote into the header of a logical scenario, with the values of
-/// the options in place of its parameters.
+/// the options in place of its parameters. The distributions of another file, whose path stands with
+/// them, replace the distributions of its parameters.
 ///
 /// # Errors
-/// [`ImportFailure`] if the other elements are not those that were written with it, or an option
-/// does not fit.
+/// [`ImportFailure`] if the other elements are not those that were written with it, or an option or
+/// a distribution does not fit.
 fn of_closecall(
     reader: &Reader,
     root: &Node,
     (text, options): (&str, &ImportOptions),
+    distributions: Option<(&Stochastic, &Path)>,
 ) -> Result<Imported, ImportFailure> {
     let path = &reader.path;
     let header = reader.child(root, &["FileHeader"])?;
@@ -284,6 +302,16 @@ fn of_closecall(
         "Closecall wrote this file: the scenario in it is used, and neither the road nor the catalogue is read"
             .to_owned(),
     ];
+    let mut whole = text.to_owned();
+    if let Some((stochastic, source)) = distributions {
+        let (replaced, replaced_notes) = replaced::with_distributions(&file, stochastic, source)?;
+        whole = replaced;
+        notes.push(match stochastic.seed {
+            Some(seed) => format!("the distributions ask for `-n {} --seed {seed}`", stochastic.runs),
+            None => format!("the distributions ask for `-n {}`, and for no random seed", stochastic.runs),
+        });
+        notes.extend(replaced_notes);
+    }
     let mut settings = Vec::new();
     for (written, value) in &options.parameters {
         let name = written.replace('_', "-");
@@ -297,7 +325,7 @@ fn of_closecall(
         settings.push(setting.map_err(|source| invalid(ScenarioError::Set { path: path.clone(), source }))?);
         notes.push(format!("`{name}` is {value} in every sample"));
     }
-    let file = ScenarioFile::parse(path, text, &settings).map_err(invalid)?;
+    let file = ScenarioFile::parse(path, &whole, &settings).map_err(invalid)?;
     file.check().map_err(invalid)?;
     Ok(Imported { text: file.text().to_owned(), notes, events: Vec::new() })
 }

@@ -282,7 +282,21 @@ const TRANSITION_DYNAMICS: [Attribute; 4] = [
     number("value"),
 ];
 
-static ELEMENTS: [Element; 133] = [
+/// The positions of the standard.
+const POSITIONS: [&str; 10] = [
+    "WorldPosition",
+    "RelativeWorldPosition",
+    "RelativeObjectPosition",
+    "RoadPosition",
+    "RelativeRoadPosition",
+    "LanePosition",
+    "RelativeLanePosition",
+    "RoutePosition",
+    "GeoPosition",
+    "TrajectoryPosition",
+];
+
+static ELEMENTS: [Element; 150] = [
     element(
         "OpenSCENARIO",
         &[],
@@ -525,21 +539,22 @@ static ELEMENTS: [Element; 133] = [
     element("RelativeTargetLane", &[text("entityRef"), integer("value")], &[]),
     element("TeleportAction", &[], &["Position"]),
     element(
-        "Position",
-        &[],
-        &[
-            "WorldPosition",
-            "RelativeWorldPosition",
-            "RelativeObjectPosition",
-            "RoadPosition",
-            "RelativeRoadPosition",
-            "LanePosition",
-            "RelativeLanePosition",
-            "RoutePosition",
-            "GeoPosition",
-            "TrajectoryPosition",
-        ],
+        "SynchronizeAction",
+        &[text("masterEntityRef"), at_least_0("targetTolerance"), at_least_0("targetToleranceMaster")],
+        &["TargetPositionMaster", "TargetPosition", "FinalSpeed"],
     ),
+    element("TargetPositionMaster", &[], &POSITIONS),
+    element("TargetPosition", &[], &POSITIONS),
+    element("FinalSpeed", &[], &["AbsoluteSpeed", "RelativeSpeedToMaster"]),
+    element("AbsoluteSpeed", &[number("value")], &["TargetDistanceSteadyState", "TargetTimeSteadyState"]),
+    element(
+        "RelativeSpeedToMaster",
+        &[word("speedTargetValueType", &SPEED_TARGET_VALUE_TYPE), number("value")],
+        &["TargetDistanceSteadyState", "TargetTimeSteadyState"],
+    ),
+    element("TargetDistanceSteadyState", &[at_least_0("distance")], &[]),
+    element("TargetTimeSteadyState", &[at_least_0("time")], &[]),
+    element("Position", &[], &POSITIONS),
     element("LanePosition", &[integer("laneId"), number("offset"), text("roadId"), number("s")], &["Orientation"]),
     element(
         "RelativeLanePosition",
@@ -719,9 +734,30 @@ static ELEMENTS: [Element; 133] = [
         &["DistributionSet", "DistributionRange", "UserDefinedDistribution"],
     ),
     element("DistributionSet", &[], &["Element*"]),
-    element("Element", &[text("value")], &[]),
+    element("Element", &[text("value"), at_least_0("weight")], &[]),
     element("DistributionRange", &[number("stepWidth")], &["Range"]),
     element("Range", &[number("lowerLimit"), number("upperLimit")], &[]),
+    element("Stochastic", &[count("numberOfTestRuns"), number("randomSeed")], &["StochasticDistribution*"]),
+    element(
+        "StochasticDistribution",
+        &[text("parameterName")],
+        &[
+            "ProbabilityDistributionSet",
+            "NormalDistribution",
+            "LogNormalDistribution",
+            "UniformDistribution",
+            "PoissonDistribution",
+            "Histogram",
+            "UserDefinedDistribution",
+        ],
+    ),
+    element("ProbabilityDistributionSet", &[], &["Element*"]),
+    element("NormalDistribution", &[number("expectedValue"), at_least_0("variance")], &["Range"]),
+    element("LogNormalDistribution", &[number("expectedValue"), at_least_0("variance")], &["Range"]),
+    element("UniformDistribution", &[], &["Range"]),
+    element("PoissonDistribution", &[number("expectedValue")], &["Range"]),
+    element("Histogram", &[], &["Bin*"]),
+    element("Bin", &[at_least_0("weight")], &["Range"]),
     ignored("License"),
     ignored("Properties"),
     noted("VariableDeclarations", "a scenario has no variables"),

@@ -12,13 +12,14 @@ use super::dom::{ImportError, Node};
 use super::follow::Following;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
+use super::synchronize::Meeting;
 use super::trajectory::nearest;
 use super::world::Vehicle;
 
 /// Step of the storyboard (s): the step of esmini's tests.
 pub(super) const STEP_S: f64 = 0.01;
 /// Longest storyboard without a stop trigger that fires (s).
-const LONGEST_S: f64 = 300.0;
+pub(super) const LONGEST_S: f64 = 300.0;
 /// Time that is played after the last action ended (s), if no trigger stops the storyboard.
 const AFTER_LAST_S: f64 = 20.0;
 
@@ -71,6 +72,8 @@ enum Running {
     Relative { vehicle: usize, other: usize, value: f64, is_factor: bool },
     /// Speeds at times, linear in between.
     Profile { vehicle: usize, points: Vec<(f64, f64)> },
+    /// The same, to arrive at a place when another vehicle arrives at its own.
+    Meet { vehicle: usize, points: Vec<(f64, f64)>, meeting: Meeting },
     /// A gap to another vehicle, for ever.
     Follow(Following),
     /// A lane change, until its end.
@@ -92,6 +95,7 @@ struct RunningEvent {
 }
 
 /// A storyboard that is played.
+#[derive(Clone)]
 pub(super) struct Storyboard<'a> {
     pub(super) reader: Reader,
     pub(super) road: &'a ImportedRoad,
@@ -179,8 +183,19 @@ impl<'a> Storyboard<'a> {
                 }
                 return Ok(());
             }
+            self.check_meetings()?;
             self.advance();
         }
+    }
+
+    /// Checks the arrivals of the next step by which vehicles synchronise.
+    fn check_meetings(&self) -> Result<(), ImportError> {
+        for action in self.running.iter().flat_map(|event| &event.actions) {
+            if let Running::Meet { meeting, .. } = action {
+                self.check_meeting(meeting)?;
+            }
+        }
+        Ok(())
     }
 
     fn collect_names(&mut self, node: &Node) {
@@ -316,6 +331,7 @@ impl<'a> Storyboard<'a> {
                 Running::Speed { vehicle, .. }
                 | Running::Relative { vehicle, .. }
                 | Running::Profile { vehicle, .. }
+                | Running::Meet { vehicle, .. }
                 | Running::Follow(Following { vehicle, .. }) => !replaced.contains(vehicle),
                 Running::Lane { .. } | Running::LaneFrom { .. } => true,
             });
@@ -333,7 +349,8 @@ impl<'a> Storyboard<'a> {
                 node.line, node.name
             ));
         }
-        if matches!(node.name.as_str(), "LongitudinalAction" | "LateralAction" | "RoutingAction") {
+        if matches!(node.name.as_str(), "LongitudinalAction" | "LateralAction" | "RoutingAction" | "SynchronizeAction")
+        {
             self.moves[actor] += 1;
         }
         match node.name.as_str() {
@@ -368,8 +385,10 @@ impl<'a> Storyboard<'a> {
                 }
             }
             "SynchronizeAction" => {
-                let message = "it is not read: the speeds by which the vehicles meet are left to the player";
-                Err(self.reader.error(&node, message))
+                let (points, meeting) = self.synchronize(&node, actor)?;
+                running.is_longitudinal.push(actor);
+                running.actions.push(Running::Meet { vehicle: actor, points, meeting });
+                Ok(())
             }
             "ControllerAction" | "ActivateControllerAction" => {
                 self.notes.push(format!(
@@ -553,7 +572,7 @@ impl<'a> Storyboard<'a> {
         }
     }
 
-    fn advance(&mut self) {
+    pub(super) fn advance(&mut self) {
         for vehicle in &mut self.vehicles {
             vehicle.s_m += vehicle.speed_mps * STEP_S;
             vehicle.travelled_m += vehicle.speed_mps * STEP_S;
@@ -575,7 +594,7 @@ impl<'a> Storyboard<'a> {
                     set.push((*vehicle, if *is_factor { base_mps * value } else { base_mps + value }));
                     true
                 }
-                Running::Profile { vehicle, points } => {
+                Running::Profile { vehicle, points } | Running::Meet { vehicle, points, .. } => {
                     let after = points.partition_point(|(at_s, _)| *at_s <= time_s);
                     let (Some(&(t0, v0)), next) = (points.get(after.saturating_sub(1)), points.get(after)) else {
                         return false;

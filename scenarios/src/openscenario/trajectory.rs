@@ -139,7 +139,7 @@ impl Storyboard<'_> {
                 };
                 Ok(RoadPoint { s_m, t_m: centre_m + reader.number_or(position, "offset", 0.0)? })
             }
-            _ => Err(reader.error(position, "only `WorldPosition` and `LanePosition` are read on a trajectory")),
+            _ => Err(reader.error(position, "only `WorldPosition` and `LanePosition` are read here")),
         }
     }
 

@@ -25,4 +25,5 @@ mod sobol;
 mod tests;
 
 pub use design::{Design, UnknownDesign};
+pub(crate) use random::scenario_stream;
 pub use sobol::unit_point;

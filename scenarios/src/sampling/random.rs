@@ -24,7 +24,7 @@ pub(super) fn number(seed: u64, index: u64, name: &ParameterName) -> f64 {
 }
 
 /// Returns a random stream that belongs to the scenario as a whole, not to an actor.
-pub(super) fn scenario_stream(seed: u64, index: u64, channel: &str) -> Stream {
+pub(crate) fn scenario_stream(seed: u64, index: u64, channel: &str) -> Stream {
     #[expect(clippy::expect_used, reason = "a constant, and a test draws from it")]
     let owner = ActorId::new(OWNER).expect("a legal name");
     stream(seed, index, &owner, channel)
