@@ -309,6 +309,306 @@ fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names(
     assert!(message(&refused).contains("no file of values"), "{}", message(&refused));
 }
 
+/// Returns a file of distributions for the scenario `case.xosc`.
+fn distributions(attributes: &str, inner: &[(&str, &str)]) -> String {
+    let inner: String = inner
+        .iter()
+        .map(|(name, inner)| {
+            format!("<StochasticDistribution parameterName=\"{name}\">{inner}</StochasticDistribution>\n")
+        })
+        .collect();
+    format!(
+        "<OpenSCENARIO><FileHeader revMajor=\"1\" revMinor=\"3\" date=\"2026-01-01T00:00:00\" description=\"\" \
+         author=\"\"/><ParameterValueDistribution><ScenarioFile filepath=\"case.xosc\"/><Stochastic {attributes}>\n\
+         {inner}</Stochastic></ParameterValueDistribution></OpenSCENARIO>"
+    )
+}
+
+#[test]
+fn a_file_of_distributions_gives_one_of_its_draws_to_the_scenario_that_it_names() {
+    const RUNS: &str = "numberOfTestRuns=\"3\" randomSeed=\"7\"";
+    const UNIFORM: &str = "<UniformDistribution><Range lowerLimit=\"60\" upperLimit=\"80\"/></UniformDistribution>";
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    written(folder.path(), SCENARIO, ROAD);
+    let path = folder.path().join("values.xosc");
+    fs::write(&path, distributions(RUNS, &[("Gap", UNIFORM)])).unwrap();
+    let gap_of = |number: &str| {
+        let said = stdout(&imported(&path, &output, &["--value-set", number]), 0);
+        let note = format!("draw {number} of 3 with the random seed 7: Gap = ");
+        let gap_m: f64 = said.lines().find_map(|line| line.trim().strip_prefix(&note)).unwrap().parse().unwrap();
+        // The ego closes 10 m/s until it is 30 m behind.
+        assert!((time_of(&said, "cut-in begins") - (gap_m - 30.0) / 10.0).abs() <= 0.021, "{said}");
+        gap_m
+    };
+    let gaps_m = ["1", "2", "3"].map(gap_of);
+    assert!(gaps_m.iter().all(|gap_m| (60.0..80.0).contains(gap_m)), "{gaps_m:?}");
+    assert!(gaps_m[0] != gaps_m[1] && gaps_m[1] != gaps_m[2], "{gaps_m:?}");
+    assert_eq!(["1", "2", "3"].map(gap_of), gaps_m);
+    // A distribution of whole numbers is drawn, too, and one draw needs no choice.
+    let poisson =
+        "<PoissonDistribution expectedValue=\"65\"><Range lowerLimit=\"60\" upperLimit=\"70\"/></PoissonDistribution>";
+    fs::write(&path, distributions("numberOfTestRuns=\"1\"", &[("Gap", poisson)])).unwrap();
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    let note = "draw 1 of 1 with no stated random seed, which is taken as 0: Gap = ";
+    let gap_m: f64 = said.lines().find_map(|line| line.trim().strip_prefix(note)).unwrap().parse().unwrap();
+    assert!(gap_m.fract() == 0.0 && (60.0..=70.0).contains(&gap_m), "{said}");
+    fs::remove_file(&output).unwrap();
+    let first = &["--value-set", "1"];
+    let user = "<UserDefinedDistribution type=\"mine\"/>";
+    let wide = UNIFORM.replace("80", "wide");
+    // Attributes, name of the parameter, its distribution, options, and a part of the message.
+    type Case<'a> = (&'a str, &'a str, &'a str, &'a [&'a str], &'a str);
+    let wrong: [Case<'_>; 8] = [
+        (RUNS, "Gap", UNIFORM, &[], "it has 3 draws of values: choose one value set from 1 to 3"),
+        (RUNS, "Gap", UNIFORM, &["--value-set", "4"], "from 1 to 3"),
+        (RUNS, "Gab", UNIFORM, first, "there is no parameter `Gab`"),
+        (RUNS, "Gap", user, first, "`UserDefinedDistribution`: this distribution is not read"),
+        (RUNS, "Gap", &wide, first, "`upperLimit` is `wide`"),
+        (RUNS, "Gap", "", first, "`StochasticDistribution`: it needs exactly one"),
+        ("numberOfTestRuns=\"-3\"", "Gap", UNIFORM, first, "`Stochastic`: `numberOfTestRuns` is `-3`"),
+        ("randomSeed=\"7\"", "Gap", UNIFORM, first, "`Stochastic`: it needs `numberOfTestRuns`"),
+    ];
+    for (attributes, name, inner, more, word) in wrong {
+        fs::write(&path, distributions(attributes, &[(name, inner)])).unwrap();
+        let refused = imported(&path, &output, more);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{word}: {said}");
+        assert!(said.contains(".xosc:") && said.contains(word), "{word}: {said}");
+        assert!(!output.exists(), "{word}");
+    }
+}
+
+/// Returns the parameters of a scenario file.
+fn parameters(path: &Path) -> toml::Table {
+    let scenario: toml::Table = toml::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    scenario["parameters"].as_table().unwrap().clone()
+}
+
+/// Returns the numbers of a distribution, in their order, or nothing if it has another form.
+fn numbers(value: &toml::Value) -> Vec<f64> {
+    match value {
+        toml::Value::Float(number) => vec![*number],
+        toml::Value::Integer(number) => vec![*number as f64],
+        toml::Value::Array(values) => values.iter().flat_map(numbers).collect(),
+        toml::Value::Table(table) => table.values().flat_map(numbers).collect(),
+        _ => Vec::new(),
+    }
+}
+
+#[test]
+fn the_distributions_that_closecall_exports_come_back_as_distributions() {
+    const FORMS: [&str; 6] = ["uniform", "truncated-normal", "log-normal", "choice", "empirical", "fixed"];
+    let folder = tempfile::tempdir().unwrap();
+    let exported = |name: &str, settings: &[&str]| {
+        let case = folder.path().join(name);
+        let words = ["tool", "export", "low-thw-overtake", "--form", "logical", "-o", case.to_str().unwrap()];
+        let settings: Vec<&str> = settings.iter().flat_map(|setting| ["--set", *setting]).collect();
+        stdout(&closecall([&words[..], &settings[..]].concat()), 0);
+        case
+    };
+    let case = exported("case", &[]);
+    let changed = exported(
+        "changed",
+        &[
+            "parameters.brake-mps2.uniform.max=7.7",
+            "parameters.reaction-s.log-normal.sigma=0.37",
+            "parameters.cut-out-thw-s.log-normal.median=0.61",
+            "parameters.hardest-braking-mps2.truncated-normal.mean=6.1",
+            "parameters.rear-class.choice.car=0.7",
+            "parameters.front-thw-s.empirical.quantiles=[0.5, 0.55, 0.7, 0.9]",
+            "rear-cc1-s=0.02",
+        ],
+    );
+    let scenario = |case: &Path, file: &str, name: &str| {
+        let output = folder.path().join(name);
+        let said = stdout(&imported(&case.join(file), &output, &[]), 0);
+        (parameters(&output), said)
+    };
+    let (before, _) = scenario(&case, "logical.xosc", "before.toml");
+    // The same distributions leave the scenario as it is, with the origin of each.
+    let (same, said) = scenario(&case, "logical-distributions.xosc", "same.toml");
+    assert_eq!(same, before);
+    assert!(said.contains("the distributions ask for `-n 1 --seed 0`"), "{said}");
+    // Other distributions replace those of the scenario.
+    let (right, _) = scenario(&changed, "logical.xosc", "right.toml");
+    fs::copy(changed.join("logical-distributions.xosc"), case.join("other.xosc")).unwrap();
+    let (other, said) = scenario(&case, "other.xosc", "other.toml");
+    assert!(said.contains("`brake-mps2` has the `UniformDistribution` of line "), "{said}");
+    assert_eq!(other.keys().collect::<Vec<_>>(), right.keys().collect::<Vec<_>>());
+    let mut replaced = 0;
+    for (name, right) in &right {
+        let form = FORMS.into_iter().find(|form| right.get(form).is_some()).unwrap();
+        let forms = FORMS.into_iter().filter(|form| other[name].get(form).is_some());
+        assert_eq!(forms.collect::<Vec<_>>(), [form], "{name}");
+        let (right, is, was) =
+            (numbers(&right[form]), numbers(&other[name][form]), before[name].get(form).map(numbers));
+        assert_eq!(is.len(), right.len(), "{name}");
+        for (is, right) in is.iter().zip(&right) {
+            assert!((is - right).abs() <= 1e-12 * right.abs(), "{name}: {is} {right}");
+        }
+        if was != Some(right) {
+            replaced += 1;
+            assert!(other[name].get("fitted").is_none(), "{name}");
+            assert!(other[name]["assumed"].as_str().unwrap().ends_with("other.xosc"), "{name}");
+        }
+    }
+    assert_eq!(replaced, 7);
+    let file = folder.path().join("other.toml");
+    let run = ["run", file.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
+    json(&closecall(run), 0);
+    // One draw of the distributions has values.
+    let drawn = folder.path().join("drawn.toml");
+    let said = stdout(&imported(&case.join("other.xosc"), &drawn, &["--value-set", "1"]), 0);
+    assert!(said.contains("draw 1 of 1 with the random seed 0: "), "{said}");
+    assert!(parameters(&drawn).values().all(|parameter| parameter.get("fixed").is_some()));
+    // What no parameter of a scenario file can have is refused by name.
+    let text = fs::read_to_string(case.join("other.xosc")).unwrap();
+    let brake = &text[text.find("<StochasticDistribution parameterName=\"brake_mps2\">").unwrap()..];
+    let brake = &brake[..brake.find("</StochasticDistribution>").unwrap()];
+    for (wrong, word) in [
+        (
+            "<PoissonDistribution expectedValue=\"5\"/>",
+            "`PoissonDistribution`: `brake-mps2`: it has several single numbers",
+        ),
+        (
+            "<ProbabilityDistributionSet><Element value=\"full\" weight=\"1\"/></ProbabilityDistributionSet>",
+            "`ProbabilityDistributionSet`: `brake-mps2`: `full` is no number",
+        ),
+    ] {
+        let start = "<StochasticDistribution parameterName=\"brake_mps2\">";
+        fs::write(case.join("wrong.xosc"), text.replace(brake, &format!("{start}{wrong}"))).unwrap();
+        let refused = imported(&case.join("wrong.xosc"), &folder.path().join("wrong.toml"), &[]);
+        assert_eq!(code(&refused), 3);
+        assert!(message(&refused).contains("wrong.xosc:") && message(&refused).contains(word), "{}", message(&refused));
+    }
+    let missing = text.replace("\"brake_mps2\"", "\"braking\"");
+    fs::write(case.join("wrong.xosc"), missing).unwrap();
+    let refused = imported(&case.join("wrong.xosc"), &folder.path().join("wrong.toml"), &[]);
+    assert!(message(&refused).contains("there is no parameter `braking`, only brake_mps2"), "{}", message(&refused));
+    assert!(!folder.path().join("wrong.toml").exists());
+}
+
+/// Returns the scenario with a synchronisation of the truck in place of the lane change, which
+/// begins at 3 s. Then the ego is at 140 m and drives 30 m/s, and the truck at 170 m with 20 m/s.
+fn synchronised(attributes: &str, (master_m, target_m): (f64, f64), rest: &str) -> String {
+    let start = SCENARIO.find("<LateralAction>").unwrap();
+    let end = SCENARIO.find("</LateralAction>").unwrap() + "</LateralAction>".len();
+    let action = format!(
+        "<SynchronizeAction {attributes}><TargetPositionMaster><LanePosition roadId=\"1\" laneId=\"-1\" \
+         s=\"{master_m}\"/></TargetPositionMaster><TargetPosition><LanePosition roadId=\"1\" laneId=\"-2\" \
+         s=\"{target_m}\"/></TargetPosition>{rest}</SynchronizeAction>"
+    );
+    [&SCENARIO[..start], action.as_str(), &SCENARIO[end..]].concat()
+}
+
+#[test]
+fn a_synchronised_vehicle_arrives_at_its_target_when_its_master_does() {
+    const MASTER: &str = "masterEntityRef=\"Ego\" targetTolerance=\"1\" targetToleranceMaster=\"1\"";
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let end = |inner: &str| format!("<FinalSpeed>{inner}</FinalSpeed>");
+    let steady = |inner: &str| end(&format!("<AbsoluteSpeed value=\"24\">{inner}</AbsoluteSpeed>"));
+    let relative = |value: &str, kind: &str| {
+        end(&format!("<RelativeSpeedToMaster value=\"{value}\" speedTargetValueType=\"{kind}\"/>"))
+    };
+    // The ego needs 10 s for 300 m. The truck has 230 m to drive, at a mean speed of 23 m/s.
+    for (rest, final_mps, steady_from_s) in [
+        (String::new(), 26.0, 13.0),
+        (end("<AbsoluteSpeed value=\"20\"/>"), 20.0, 13.0),
+        (steady("<TargetTimeSteadyState time=\"2\"/>"), 24.0, 11.0),
+        (steady("<TargetDistanceSteadyState distance=\"72\"/>"), 24.0, 10.0),
+        (relative("-5", "delta"), 25.0, 13.0),
+        (relative("0.7", "factor"), 21.0, 13.0),
+    ] {
+        let path = written(folder.path(), &synchronised(MASTER, (440.0, 400.0), &rest), ROAD);
+        let said = stdout(&imported(&path, &output, &[]), 0);
+        assert!((time_of(&said, "cut-in ends") - 13.0).abs() <= 0.021, "{rest}: {said}");
+        assert!(said.contains("`Slow_Truck` arrives at its target at 13.00 s"), "{said}");
+        let text = fs::read_to_string(&output).unwrap();
+        let scenario: toml::Table = toml::from_str(&text).unwrap();
+        let profile = scenario["actor"][1]["driver"]["prescribed"]["profile"].as_array().unwrap();
+        let points: Vec<[f64; 2]> =
+            profile.iter().map(|point| [0, 1].map(|index| point[index].as_float().unwrap())).collect();
+        let speed_mps = |at_s: f64| {
+            let after = points.iter().position(|[time_s, _]| *time_s > at_s).unwrap();
+            let ([t0, v0], [t1, v1]) = (points[after - 1], points[after]);
+            v0 + (v1 - v0) * (at_s - t0) / (t1 - t0)
+        };
+        // The truck starts at 110 m; 4 m more lead to the centre of its box.
+        let driven_m: f64 = (0..1_300).map(|step| 0.01 * speed_mps(0.01 * f64::from(step) + 0.005)).sum();
+        assert!((110.0 + driven_m - 400.0).abs() < 0.1, "{rest}: {driven_m}: {text}");
+        for at_s in [steady_from_s, 13.0] {
+            assert!((speed_mps(at_s) - final_mps).abs() < 0.05, "{rest}: {at_s}: {text}");
+        }
+        let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
+        json(&closecall(run), 0);
+    }
+}
+
+#[test]
+fn a_synchronisation_that_no_vehicle_can_keep_is_refused_with_the_reason() {
+    const MASTER: &str = "masterEntityRef=\"Ego\"";
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let right = synchronised(MASTER, (440.0, 400.0), "");
+    let slows = "<ManeuverGroup name=\"others\" maximumExecutionCount=\"1\"><Actors selectTriggeringEntities=\"false\">\
+                 <EntityRef entityRef=\"Ego\"/></Actors><Maneuver name=\"slows\"><Event name=\"slows\" \
+                 priority=\"parallel\" maximumExecutionCount=\"1\"><Action name=\"slows-action\"><PrivateAction>\
+                 <LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape=\"linear\" value=\"2\" \
+                 dynamicsDimension=\"rate\"/><SpeedActionTarget><AbsoluteTargetSpeed value=\"20\"/></SpeedActionTarget>\
+                 </SpeedAction></LongitudinalAction></PrivateAction></Action><StartTrigger><ConditionGroup><Condition \
+                 name=\"later\" delay=\"0\" conditionEdge=\"none\"><ByValueCondition><SimulationTimeCondition \
+                 value=\"AT\" rule=\"greaterThan\"/></ByValueCondition></Condition></ConditionGroup></StartTrigger>\
+                 </Event></Maneuver></ManeuverGroup>";
+    let with_group =
+        |at_s: &str| right.replacen("</ManeuverGroup>", &format!("</ManeuverGroup>{}", slows.replace("AT", at_s)), 1);
+    let lane = "<TargetPosition><LanePosition roadId=\"1\" laneId=\"-2\" s=\"400\"/>";
+    let final_speed = |speed: &str| synchronised(MASTER, (440.0, 400.0), &format!("<FinalSpeed>{speed}</FinalSpeed>"));
+    for (scenario, element, word) in [
+        (synchronised(MASTER, (100.0, 400.0), ""), "TargetPositionMaster", "`Ego` is not before it"),
+        (synchronised(MASTER, (440.0, 100.0), ""), "TargetPosition", "m behind `Slow_Truck`"),
+        (synchronised(MASTER, (440.0, 250.0), ""), "SynchronizeAction", "0 to 100 m/s are possible"),
+        (synchronised(MASTER, (290.0, 400.0), ""), "SynchronizeAction", "-9 to 5 m/s² are possible"),
+        (
+            synchronised(MASTER, (20_000.0, 400.0), ""),
+            "SynchronizeAction",
+            "does not arrive at its target within 300 s",
+        ),
+        (right.replace(MASTER, "masterEntityRef=\"Slow_Truck\""), "SynchronizeAction", "the vehicle itself"),
+        (right.replace(MASTER, "masterEntityRef=\"Nobody\""), "SynchronizeAction", "only Ego, Slow_Truck"),
+        (right.replace(MASTER, ""), "SynchronizeAction", "it needs `masterEntityRef`"),
+        (right.replace(lane, "<TargetPosition>"), "TargetPosition", "exactly one element"),
+        (
+            right.replace(lane, "<TargetPosition><RelativeLanePosition entityRef=\"Ego\" dLane=\"0\" ds=\"9\"/>"),
+            "RelativeLanePosition",
+            "only `WorldPosition` and `LanePosition` are read",
+        ),
+        (right.replace(lane, &lane.replace("s=", "offset=\"9\" s=")), "LanePosition", "beside the nearest lane"),
+        (final_speed("<AbsoluteSpeed value=\"-3\"/>"), "AbsoluteSpeed", "a speed of -3 m/s"),
+        (
+            final_speed("<AbsoluteSpeed value=\"20\"><TargetTimeSteadyState time=\"12\"/></AbsoluteSpeed>"),
+            "SynchronizeAction",
+            "must be shorter than",
+        ),
+        (with_group("6"), "SynchronizeAction", "`Ego` changes its speed on the way"),
+    ] {
+        let _ = fs::remove_file(&output);
+        let refused = imported(&written(folder.path(), &scenario, ROAD), &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{word}: {said}");
+        assert!(said.contains("case.xosc:") && said.contains(&format!("`{element}`: ")), "{word}: {said}");
+        assert!(said.contains(word), "{word}: {said}");
+        assert!(!output.exists(), "{word}");
+    }
+    // After the arrival, and if it has begun before, a change of speed is known. From 2 s to 7 s, the
+    // ego comes to 235 m and to 20 m/s.
+    for (at_s, arrival_s) in [("14", 13.0), ("2", 7.0 + 205.0 / 20.0)] {
+        let said = stdout(&imported(&written(folder.path(), &with_group(at_s), ROAD), &output, &[]), 0);
+        assert!((time_of(&said, "cut-in ends") - arrival_s).abs() <= 0.031, "{said}");
+    }
+}
+
 #[test]
 fn a_distance_that_no_driver_keeps_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
