@@ -95,8 +95,7 @@ impl ValueFile {
 /// Reads the values of a document, which [`super::structure::check`] has checked.
 ///
 /// # Errors
-/// [`ImportError`] at an element beside the values, or at a distribution that has no list of
-/// values.
+/// [`ImportError`] at an element beside the values, or at a distribution that is not read.
 pub(super) fn read(reader: &Reader, root: &Node, distribution: &Node) -> Result<ValueFile, ImportError> {
     let mut beside = root.children.iter().filter(|child| child.name != "FileHeader" && child.name != distribution.name);
     if let Some(other) = beside.next() {
