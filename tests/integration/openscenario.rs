@@ -290,7 +290,7 @@ fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names(
         ("", "", &["--value-set", "3"], "from 1 to 2"),
         ("", "", &["--value-set", "0"], "from 1 to 2"),
         ("\"Gap\"", "\"Gab\"", first, "there is no parameter `Gab`"),
-        ("value=\"60\"", "value=\"wide\"", first, "the double `Gap`: `value` is `wide`"),
+        ("value=\"60\"", "value=\"wide\"", first, "`Gap`, whose value is given from outside: `value` is `wide`"),
         ("value=\"60\"", "worth=\"60\"", first, "`worth` is no attribute"),
         ("case.xosc", "cases.xosc", first, "values.xosc:2: `ScenarioFile`: failed to read"),
         ("case.xosc", "values.xosc", first, "must name a scenario"),
@@ -651,8 +651,8 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ("${$EgoSpeed / 3.6}", "fast", &["AbsoluteTargetSpeed", "fast", "number"]),
         ("${$EgoSpeed / 3.6}", "NaN", &["AbsoluteTargetSpeed", "NaN", "number"]),
         ("road.xodr", "no-such-road.xodr", &[":11:", "LogicFile", "no-such-road.xodr"]),
-        ("roadId=\"1\"", "roadId=\"7\"", &["road.xodr", "no road `7`", "only 1"]),
-        ("laneId=\"-1\"", "laneId=\"-3\"", &["lane -3", "only -1, -2"]),
+        ("roadId=\"1\"", "roadId=\"7\"", &["case.xosc:42: `LanePosition`", "no road `7`", "road.xodr, only 1"]),
+        ("laneId=\"-1\"", "laneId=\"-3\"", &["case.xosc:42: `LanePosition`", "lane -3", "road.xodr, only -1, -2"]),
         ("s=\"50\" offset=\"0\"", "s=\"50\" offset=\"0.5\"", &["LanePosition", "offset"]),
         ("vehicleCategory=\"truck\"", "vehicleCategory=\"tram\"", &[":26:", "Vehicle", "tram"]),
         ("<Dimensions length=\"12\" width=\"2.5\" height=\"4\"/>", "", &["Vehicle", "BoundingBox/Dimensions"]),
@@ -684,8 +684,27 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ("<Story ", "<Tale/><Story ", &["`Tale`", "no element of `Storyboard`"]),
         ("${$EgoSpeed / 3.6}", "-50", &["AbsoluteTargetSpeed", "-50 m/s; 0 to 100 m/s"]),
         ("name=\"Slow_Truck\"", "name=\"Ego\"", &["ScenarioObject", "an entity `Ego` already"]),
-        ("length=\"12\"", "length=\"-12\"", &["Dimensions", "`length` must be above 0 m"]),
-        ("length=\"12\"", "length=\"500\"", &["ScenarioObject", "`Slow_Truck`", "length-m"]),
+        ("length=\"12\"", "length=\"-12\"", &[":29:", "`Dimensions`", "`length` is -12; 1 to 26 m are needed"]),
+        ("length=\"12\"", "length=\"500\"", &[":29:", "`Dimensions`", "`length` is 500; 1 to 26 m are needed"]),
+        (
+            "entityRef=\"Slow_Truck\" value=",
+            "\n\nentityRef=\"Fast_Truck\"\nvalue=",
+            &["case.xosc:90: `TimeHeadwayCondition`", "Fast_Truck"],
+        ),
+        (
+            "value=\"2\" dynamicsDimension=\"rate\"",
+            "value=\"-1e9\" dynamicsDimension=\"rate\"",
+            &["case.xosc:102: `SpeedActionDynamics`", "-1000000000.00 m/s²; -12 to 12 m/s² are possible"],
+        ),
+        (
+            "value=\"2\" dynamicsDimension=\"rate\"",
+            "value=\"0.1\" dynamicsDimension=\"time\"",
+            &["case.xosc:102: `SpeedActionDynamics`", "-100.00 m/s²; -12 to 12 m/s² are possible"],
+        ),
+        ("s=\"50\"", "s=\"-1e9\"", &["case.xosc:42: `LanePosition`", "0 to 3000 m, the length of the road"]),
+        ("ds=\"$Gap\"", "ds=\"1e9\"", &["case.xosc:55: `RelativeLanePosition`", "`Slow_Truck`", "s-m"]),
+        ("<Center x=\"4\"", "<Center x=\"1e9\"", &["case.xosc:28: `Center`", "`x` is 1000000000; -12 to 12 m"]),
+        ("mass=\"1600\"", "mass=\"1e9\"", &["case.xosc:15: `Vehicle`", "100 to 60000 kg are needed"]),
         ("a cut-in, for tests", "a cut-in\0", &["U+0000 is not allowed"]),
         ("a cut-in, for tests", "a cut-in&#1;", &["FileHeader"]),
     ]
@@ -756,7 +775,7 @@ fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written
 fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
-    let faults: [(&str, &str, &str); 25] = [
+    let faults: [(&str, &str, &str); 33] = [
         ("<OpenDRIVE>", "<OpenStreet>", "it is no XML"),
         ("</OpenDRIVE>", "", "ends before its root element"),
         ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
@@ -777,11 +796,19 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
         ("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", "", "no `width`"),
         ("a=\"3.5\"", "a=\"35\"", "`a` is 35; a lane"),
-        ("a=\"3.5\"", "a=\"-3\"", "`width`: `a` is -3; a lane"),
+        ("a=\"3.5\"", "a=\"-3\"", "`width`: `a` is -3; a width has 0 to 100 m"),
         ("curvature=\"0.001\"", "curvature=\"1e9\"", "`arc`: `curvature` is beyond 0.2 1/m"),
         ("<road ", "<road id=\"1\"/><road ", "`road`: a road before it has the number `1` already"),
         ("length=\"", "length=\"-", "`length` is -"),
         ("id=\"-2\"", "id=\"-1\"", "a lane before it has the number -1 already"),
+        ("hdg=\"0\"", "hdg=\"abc\"", "road.xodr:6: `geometry`: `hdg` is `abc`"),
+        ("<geometry s=\"0\"", "<geometry s=\"nan\"", "road.xodr:6: `geometry`: `s` is `nan`"),
+        ("max=\"120\"", "max=\"fast\"", "road.xodr:5: `speed`: `max` is `fast`"),
+        ("max=\"120\"", "max=\"-360\"", "`max` is -100 m/s; 0 to 100 m/s"),
+        ("unit=\"km/h\"", "unit=\"knots\"", "`unit` is `knots`; one of m/s, km/h, mph"),
+        ("a=\"2.5\"", "a=\"nan\"", "`width`: `a` is `nan`"),
+        ("id=\"-3\"", "id=\"-3.5\"", "`lane`: `id` is -3.5; a whole number"),
+        ("junction=\"-1\"", "junction=\"-1\" rule=\"UK\"", "`rule` is `UK`; one of RHT, LHT"),
     ];
     for (right, wrong, word) in faults {
         assert!(ROAD.contains(right), "{right}");
@@ -799,6 +826,9 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         let said = message(&refused);
         assert_eq!(code(&refused), 3, "{wrong}: {said}");
         assert!(said.contains(word), "{wrong}: {word}: {said}");
+        // A position that names no road or no lane is an error of the scenario.
+        let is_of_scenario = word.starts_with("no road") || word == "no driving lane";
+        assert!(said.contains(if is_of_scenario { "case.xosc:42: `LanePosition`" } else { "road.xodr:" }), "{said}");
         assert!(!output.exists(), "{wrong}");
     }
 }

@@ -62,6 +62,11 @@ pub struct Environment {
 }
 
 impl Environment {
+    /// Rain that the models cover (mm/h).
+    pub const RAIN_MM_PER_H: Range = Range::closed(0.0, 200.0);
+    /// Friction that the models cover.
+    pub const FRICTION: Range = Range::closed(0.1, 1.2);
+
     /// A clear, dry day: visibility 10 km, friction 0.9.
     pub const CLEAR_DAY: Self =
         Self { light: Light::Day, visibility_m: 10_000.0, rain_mm_per_h: 0.0, water_film_mm: 0.0, friction: 0.9 };
@@ -75,9 +80,9 @@ impl Check for EnvironmentConfig {
         Ok(Environment {
             light: parameters.word(&self.light, "light")?,
             visibility_m: number(&self.visibility_m, "visibility-m", Range::closed(20.0, 100_000.0))?,
-            rain_mm_per_h: number(&self.rain_mm_per_h, "rain-mm-per-h", Range::closed(0.0, 200.0))?,
+            rain_mm_per_h: number(&self.rain_mm_per_h, "rain-mm-per-h", Environment::RAIN_MM_PER_H)?,
             water_film_mm: number(&self.water_film_mm, "water-film-mm", Range::closed(0.0, 10.0))?,
-            friction: number(&self.friction, "friction", Range::closed(0.1, 1.2))?,
+            friction: number(&self.friction, "friction", Environment::FRICTION)?,
         })
     }
 }

@@ -64,6 +64,13 @@ pub struct Dimensions {
 const WHEELBASE_SHARE: f64 = 0.6;
 
 impl Dimensions {
+    /// Lengths of a vehicle of a scenario (m).
+    pub const LENGTH_M: Range = Range::closed(1.0, 26.0);
+    /// Widths of a vehicle of a scenario (m).
+    pub const WIDTH_M: Range = Range::closed(0.4, 3.0);
+    /// Heights of a vehicle of a scenario (m).
+    pub const HEIGHT_M: Range = Range::closed(0.8, 4.5);
+
     /// Returns the distance from the rear axle to the front axle (m). The centre of the box lies
     /// half of it ahead of the rear axle.
     pub fn wheelbase_m(&self) -> f64 {
@@ -154,6 +161,9 @@ pub struct Vehicle {
 const BRAKE_LIGHT_MPS2: [f64; 2] = [0.7, 1.3];
 
 impl Vehicle {
+    /// Masses of a vehicle of a scenario (kg).
+    pub const MASS_KG: Range = Range::closed(100.0, 60_000.0);
+
     /// Creates a vehicle with the typical properties of its class.
     pub const fn typical(class: VehicleClass) -> Self {
         Self {
@@ -216,11 +226,11 @@ impl Check for VehicleConfig {
         Ok(Vehicle {
             class: typical.class,
             dimensions: Dimensions {
-                length_m: or_typical(&self.length_m, "length-m", Range::closed(1.0, 26.0), size.length_m)?,
-                width_m: or_typical(&self.width_m, "width-m", Range::closed(0.4, 3.0), size.width_m)?,
-                height_m: or_typical(&self.height_m, "height-m", Range::closed(0.8, 4.5), size.height_m)?,
+                length_m: or_typical(&self.length_m, "length-m", Dimensions::LENGTH_M, size.length_m)?,
+                width_m: or_typical(&self.width_m, "width-m", Dimensions::WIDTH_M, size.width_m)?,
+                height_m: or_typical(&self.height_m, "height-m", Dimensions::HEIGHT_M, size.height_m)?,
             },
-            mass_kg: or_typical(&self.mass_kg, "mass-kg", Range::closed(100.0, 60_000.0), typical.mass_kg)?,
+            mass_kg: or_typical(&self.mass_kg, "mass-kg", Vehicle::MASS_KG, typical.mass_kg)?,
             appearance: Appearance {
                 paint_reflectivity: or_typical(
                     &self.paint_reflectivity,

@@ -52,6 +52,7 @@ impl Attribute {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Node {
     pub(super) name: String,
+    /// Line on which its start tag begins.
     pub(super) line: usize,
     /// Number of the element in the document.
     pub(super) id: usize,
@@ -131,11 +132,14 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
     let (mut count, mut line, mut counted) = (0, 1, 0);
     loop {
         let event = reader.read_event();
+        // An element is where its start tag begins, which can have many lines.
+        let begins = line;
         let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX).min(text.len());
         line += text.as_bytes()[counted.min(at)..at].iter().filter(|byte| **byte == b'\n').count();
         counted = at;
         let element = open.last().map(|node| node.name.clone()).unwrap_or_default();
-        let fail = |message: String| Err(ImportError { path: path.to_owned(), line, element, message });
+        let line_of_event = if matches!(event, Ok(Event::Start(_))) { begins } else { line };
+        let fail = |message: String| Err(ImportError { path: path.to_owned(), line: line_of_event, element, message });
         match event {
             Err(error) => return fail(format!("it is no XML document: {error}")),
             Ok(Event::DocType(_)) => return fail("a document type declaration is not allowed".to_owned()),
@@ -144,7 +148,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
                 if open.len() >= MOST_DEPTH || count > MOST_ELEMENTS {
                     return fail(format!("more than {MOST_DEPTH} levels or {MOST_ELEMENTS} elements"));
                 }
-                match node(&start, line) {
+                match node(&start, begins) {
                     Ok(node) => open.push(Node { id: count, ..node }),
                     Err(message) => return fail(message),
                 }
@@ -204,4 +208,21 @@ fn node(start: &BytesStart<'_>, line: usize) -> Result<Node, String> {
         attributes.push(Attribute { key, value: value.into_owned() });
     }
     Ok(Node { name, line, attributes, ..Node::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_element_is_on_the_line_on_which_its_start_tag_begins() {
+        let text = "<a>\n  text\n  <b\n    x=\"1\"\n    y=\"2\n\"\n  /><c/>\n  <d\n  >\n  <!-- \n --><e/></d></a>";
+        let root = parse(Path::new("a.xml"), text).unwrap();
+        let lines: Vec<_> = root.children.iter().map(|child| (child.name.as_str(), child.line)).collect();
+        assert_eq!((root.line, &lines[..]), (1, &[("b", 3), ("c", 7), ("d", 8)][..]));
+        assert_eq!(root.at(&["d", "e"]).map(|node| node.line), Some(11));
+        let wrong = text.replace("y=\"2\n\"", "x=\"2\n\"");
+        let error = parse(Path::new("a.xml"), &wrong).unwrap_err();
+        assert_eq!((error.line, error.element.as_str()), (3, "a"), "{error}");
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::input;
+use closecall_traffic::{Dimensions, Range, input};
 
 use super::dom::{ImportError, Node, parse};
 use super::formula::no_parameter;
@@ -160,19 +160,40 @@ fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
         _ => return Err(reader.error(node, format!("a `{category}` is no car, truck or motorcycle"))),
     };
     let size = reader.child(node, &["BoundingBox", "Dimensions"])?;
-    for name in ["length", "width", "height"] {
-        if !(reader.number(size, name)? > 0.0) {
-            return Err(reader.error(size, format!("`{name}` must be above 0 m")));
+    let length_m = within(reader, size, ("length", Dimensions::LENGTH_M, "m"))?;
+    let width_m = within(reader, size, ("width", Dimensions::WIDTH_M, "m"))?;
+    let height_m = within(reader, size, ("height", Dimensions::HEIGHT_M, "m"))?;
+    let centre = reader.child(node, &["BoundingBox", "Center"])?;
+    // The reference point lies under the box, or not far from it.
+    for (name, size_m) in [("x", length_m), ("y", width_m), ("z", height_m)] {
+        if centre.raw(name).is_some() {
+            within(reader, centre, (name, Range::closed(-size_m, size_m), "m"))?;
         }
     }
-    let centre = reader.child(node, &["BoundingBox", "Center"])?;
+    let mass_kg = match reader.number_or(node, "mass", 0.0)? {
+        // Some programs write a mass of 0 if they do not know it.
+        0.0 => None,
+        _ => Some(within(reader, node, ("mass", closecall_traffic::Vehicle::MASS_KG, "kg"))?),
+    };
     Ok(Vehicle {
         class,
-        length_m: reader.number(size, "length")?,
-        width_m: reader.number(size, "width")?,
-        height_m: reader.number(size, "height")?,
-        mass_kg: node.raw("mass").map(|_| reader.number(node, "mass")).transpose()?,
+        length_m,
+        width_m,
+        height_m,
+        mass_kg,
         centre_m: reader.number(centre, "x")?,
         ..Vehicle::default()
     })
+}
+
+/// Returns a number in the range that a vehicle of a scenario can have.
+fn within(reader: &Reader, node: &Node, (name, range, unit): (&str, Range, &str)) -> Result<f64, ImportError> {
+    let value = reader.number(node, name)?;
+    match range.contains(value) {
+        true => Ok(value),
+        false => {
+            let message = format!("`{name}` is {value}; {} to {} {unit} are needed", range.low(), range.high());
+            Err(reader.error(node, message))
+        }
+    }
 }

@@ -20,6 +20,7 @@ mod plane;
 mod reader;
 mod replaced;
 mod road;
+mod shape;
 mod standard;
 mod stochastic;
 mod storyboard;
@@ -33,7 +34,7 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::{Segment, input};
+use closecall_traffic::{Environment, Segment, input};
 
 pub use dom::ImportError;
 
@@ -228,20 +229,18 @@ fn at_element(reader: &Reader, (root, vehicles): (&Node, &[Vehicle]), error: Sce
         return ImportFailure::Scenario { path: reader.path.clone(), source: Box::new(error) };
     };
     let message = format!("the scenario that it describes is not valid: {source}");
-    let vehicle = match &source.path.0[..] {
-        [Segment::Key(key), Segment::Index(index), ..] if key == "actor" => vehicles.get(*index),
-        _ => None,
+    let (vehicle, keys) = match &source.path.0[..] {
+        [Segment::Key(key), Segment::Index(index), keys @ ..] if key == "actor" => (vehicles.get(*index), keys),
+        _ => (None, <&[Segment]>::default()),
     };
-    let error = match vehicle {
-        Some(vehicle) => ImportError {
-            path: reader.path.clone(),
-            line: vehicle.line,
-            element: "ScenarioObject".to_owned(),
-            message: format!("`{}`: {message}", vehicle.name),
-        },
-        None => reader.error(root, message),
+    let Some(vehicle) = vehicle else { return reader.error(root, message).into() };
+    let is = |segment: Option<&Segment>, name: &str| matches!(segment, Some(Segment::Key(key)) if key == name);
+    let (line, element) = match is(keys.first(), "start") && !is(keys.last(), "speed-mps") {
+        true => vehicle.start.clone(),
+        false => (vehicle.line, "ScenarioObject".to_owned()),
     };
-    error.into()
+    let message = format!("`{}`: {message}", vehicle.name);
+    ImportError { path: reader.path.clone(), line, element, message }.into()
 }
 
 fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
@@ -378,6 +377,8 @@ fn road_of(reader: &Reader, root: &Node, storyboard: &Node) -> Result<ImportedRo
         Some(position) => UsedRoad::Lane {
             road_id: reader.text(position, "roadId")?,
             lane: reader.number(position, "laneId")? as i32,
+            reader,
+            position,
         },
         None if is_in_plane => UsedRoad::Only,
         None => {
@@ -416,7 +417,14 @@ fn environment(reader: &Reader, globals: &[Node], notes: &mut Vec<String>) -> Re
             keys.extend(rain_key(reader, rain, notes)?);
         }
         if let Some(surface) = environment.child("RoadCondition") {
-            keys.push(format!("friction = {:?}", DRY_FRICTION * reader.number(surface, "frictionScaleFactor")?));
+            let scale = reader.number(surface, "frictionScaleFactor")?;
+            if !Environment::FRICTION.contains(DRY_FRICTION * scale) {
+                let [low, high] =
+                    [Environment::FRICTION.low(), Environment::FRICTION.high()].map(|friction| friction / DRY_FRICTION);
+                let message = format!("`frictionScaleFactor` is {scale}; {low:.2} to {high:.2} are possible");
+                return Err(reader.error(surface, message));
+            }
+            keys.push(format!("friction = {:?}", DRY_FRICTION * scale));
         }
         notes.push(format!("line {}: of the environment, visibility, rain and friction are read", action.line));
     }
@@ -433,6 +441,12 @@ fn rain_key(reader: &Reader, rain: &Node, notes: &mut Vec<String>) -> Result<Opt
     let has_unit = rain.raw("precipitationIntensity").is_some();
     let intensity = reader.number(rain, if has_unit { "precipitationIntensity" } else { "intensity" })?;
     if kind == "rain" && has_unit {
+        let range = Environment::RAIN_MM_PER_H;
+        if !range.contains(intensity) {
+            let (low, high) = (range.low(), range.high());
+            let message = format!("`precipitationIntensity` is {intensity}; {low} to {high} mm/h are possible");
+            return Err(reader.error(rain, message));
+        }
         return Ok(Some(format!("rain-mm-per-h = {intensity:?}")));
     }
     if intensity > 0.0 {
@@ -488,7 +502,8 @@ fn scenario_text(
         let id = kebab(&start.name);
         if names.contains(&id) {
             let message = format!("two vehicles would have the name `{id}`");
-            return Err(ImportError { path: path.to_owned(), line: 1, element: "Entities".to_owned(), message });
+            let element = "ScenarioObject".to_owned();
+            return Err(ImportError { path: path.to_owned(), line: start.line, element, message });
         }
         if id != start.name {
             played.notes.push(format!("`{}` is named `{id}`", start.name));

@@ -8,13 +8,18 @@ use closecall_traffic::Road;
 
 use super::dom::{ImportError, Node, parse};
 use super::plane::ReferenceLine;
+use super::reader::Reader;
+use super::shape;
 
 /// Names of the lane types on which vehicles drive.
 const DRIVING: [&str; 8] = ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
 
-/// Largest curvature of a road (1/m): no car drives through less than 5 m of radius. An assumption; 0.1
-/// to 0.25 are plausible.
-const MOST_CURVATURE_PER_M: f64 = 0.2;
+/// Numbers of lanes of a scenario file.
+const LANES: std::ops::RangeInclusive<usize> = 1..=8;
+/// Highest speed limit of a scenario file (m/s).
+const MOST_SPEED_LIMIT_MPS: f64 = 100.0;
+/// The words of the standard for no speed limit.
+const NO_LIMIT: [&str; 2] = ["no limit", "undefined"];
 
 /// The part of a file's road that a scenario can use.
 #[derive(Clone, Debug)]
@@ -22,6 +27,7 @@ pub(super) struct ImportedRoad {
     pub(super) id: String,
     /// Whether traffic keeps left, so that its lanes are on the left of the reference line.
     pub(super) is_left_hand: bool,
+    pub(super) length_m: f64,
     /// The lanes of OpenDRIVE on which traffic drives along the reference line, from the left.
     pub(super) lanes: Vec<i32>,
     /// The centres of these lanes, to the left of the reference line (m).
@@ -37,9 +43,10 @@ pub(super) struct ImportedRoad {
 
 /// The road that a scenario uses.
 #[derive(Clone, Debug)]
-pub(super) enum UsedRoad {
-    /// The road of this number; a vehicle uses this lane.
-    Lane { road_id: String, lane: i32 },
+pub(super) enum UsedRoad<'a> {
+    /// The road of this number; a vehicle uses this lane. A position of the scenario says so, and is
+    /// wrong if there is no such road or lane.
+    Lane { road_id: String, lane: i32, reader: &'a Reader, position: &'a Node },
     /// The only road of the network.
     Only,
 }
@@ -47,8 +54,9 @@ pub(super) enum UsedRoad {
 /// Reads the road that a scenario uses.
 ///
 /// # Errors
-/// [`ImportError`] if the document is no OpenDRIVE, or has no such road or no such lane.
-pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedRoad, ImportError> {
+/// [`ImportError`] if the document is no OpenDRIVE, has a number that no road has, or has no such road
+/// or no such lane.
+pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<ImportedRoad, ImportError> {
     let root = parse(path, text)?;
     if root.name != "OpenDRIVE" {
         return Err(root.error(path, "the root element must be `OpenDRIVE`"));
@@ -71,9 +79,14 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
         }
     };
     let Some(road) = root.all("road").find(|road| road.raw("id") == Some(road_id)) else {
-        return Err(root.error(path, format!("there is no road `{road_id}`, only {}", roads.join(", "))));
+        let named = if roads.is_empty() { "none".to_owned() } else { roads.join(", ") };
+        let message = format!("there is no road `{road_id}` in {}, only {named}", path.display());
+        return Err(match used {
+            UsedRoad::Lane { reader, position, .. } => reader.error(position, message),
+            UsedRoad::Only => root.error(path, message),
+        });
     };
-    check_shape(path, road)?;
+    let length_m = shape::check(path, road)?;
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
     let Some(section) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
     let mut notes = Vec::new();
@@ -81,7 +94,11 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
         notes.push("lanes that begin or end: the lanes are those of the first section".to_owned());
     }
     // With left-hand traffic, the lanes along the road are those on the left.
-    let is_left_hand = road.raw("rule") == Some("LHT");
+    let is_left_hand = match road.raw("rule") {
+        Some("LHT") => true,
+        None | Some("RHT") => false,
+        Some(other) => return Err(road.error(path, format!("`rule` is `{other}`; one of RHT, LHT is needed"))),
+    };
     let side = if is_left_hand { "left" } else { "right" };
     let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
     let mut driving: Vec<(i32, f64)> = Vec::new();
@@ -91,10 +108,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
             Some(width) => (number(path, width, "a")?, width),
             None => return Err(node.error(path, "it has no `width`")),
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "a lane's number is small, and compared with the text below"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "a small whole number, as `shape::check` has checked")]
         let id = id as i32;
         let is_lane = matches!(used, UsedRoad::Lane { lane, .. } if *lane == id);
         let is_used = is_lane && !Road::LANE_WIDTH_M.contains(width_m);
@@ -114,36 +128,43 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad) -> Result<ImportedR
     };
     let Some(&(_, lane_width_m)) = used_lane else {
         let lanes: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
-        let message = match used {
-            UsedRoad::Lane { lane, .. } => {
-                format!("lane {lane} is no driving lane on the {side} of road {road_id}, only {}", lanes.join(", "))
+        return Err(match used {
+            UsedRoad::Lane { lane, reader, position, .. } => {
+                let named = if lanes.is_empty() { "none".to_owned() } else { lanes.join(", ") };
+                let place = format!("on the {side} of road {road_id} in {}", path.display());
+                reader.error(position, format!("lane {lane} is no driving lane {place}, only {named}"))
             }
-            UsedRoad::Only => "none of its lanes is a driving lane with a width of 2.5 to 5 m".to_owned(),
-        };
-        return Err(along.error(path, message));
+            UsedRoad::Only => along.error(path, "none of its lanes is a driving lane with a width of 2.5 to 5 m"),
+        });
     };
+    if !LANES.contains(&driving.len()) {
+        let message = format!("it has {} driving lanes; a scenario has 1 to 8", driving.len());
+        return Err(along.error(path, message));
+    }
+    if along.all("lane").any(changes_width) {
+        notes.push("lanes whose width changes: each has the width of its start".to_owned());
+    }
     if driving.iter().any(|(_, width)| *width != lane_width_m) {
         notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
     }
     let curvature_per_m = curvature(path, road, &mut notes)?;
-    let limit =
-        road.at(&["type", "speed"]).filter(|speed| speed.raw("max").is_some_and(|max| max.parse::<f64>().is_ok()));
-    let speed_limit_mps = match limit {
-        Some(speed) => {
-            let factor = match speed.raw("unit") {
-                Some("km/h") => 1.0 / 3.6,
-                Some("mph") => 0.44704,
-                _ => 1.0,
-            };
-            Some(number(path, speed, "max")? * factor)
-        }
-        None => None,
-    };
+    let speed_limit_mps = road.at(&["type", "speed"]).map(|speed| speed_limit(path, speed)).transpose()?.flatten();
     let centres_m = centres_m(lanes, along, &driving);
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
     let line = reference_line(path, road, curvature_per_m);
     let id = road_id.to_owned();
-    Ok(ImportedRoad { id, is_left_hand, lanes, centres_m, lane_width_m, curvature_per_m, line, speed_limit_mps, notes })
+    Ok(ImportedRoad {
+        id,
+        is_left_hand,
+        length_m,
+        lanes,
+        centres_m,
+        lane_width_m,
+        curvature_per_m,
+        line,
+        speed_limit_mps,
+        notes,
+    })
 }
 
 /// Returns the centres of driving lanes to the left of the reference line (m), from the left.
@@ -187,27 +208,6 @@ fn reference_line(path: &Path, road: &Node, curvature_per_m: f64) -> Option<Refe
     is_one.then_some(ReferenceLine { x_m: value("x")?, y_m: value("y")?, heading_rad: value("hdg")?, curvature_per_m })
 }
 
-/// Checks that a road can exist: its lengths and its curvatures.
-fn check_shape(path: &Path, road: &Node) -> Result<(), ImportError> {
-    let is_long = |node: &Node| match number(path, node, "length")? {
-        length_m if length_m > 0.0 => Ok(()),
-        length_m => Err(node.error(path, format!("`length` is {length_m}; a length above 0 m is needed"))),
-    };
-    is_long(road)?;
-    for geometry in road.child("planView").into_iter().flat_map(|plan| plan.all("geometry")) {
-        is_long(geometry)?;
-        for shape in &geometry.children {
-            for name in ["curvature", "curvStart", "curvEnd"] {
-                if shape.raw(name).is_some() && !(number(path, shape, name)?.abs() <= MOST_CURVATURE_PER_M) {
-                    let message = format!("`{name}` is beyond {MOST_CURVATURE_PER_M} 1/m: no vehicle can follow it");
-                    return Err(shape.error(path, message));
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
 /// Returns the curvature of a road that is one line or one arc. For any other road, returns the
 /// curvature of a straight road with a note.
 fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<f64, ImportError> {
@@ -230,7 +230,37 @@ fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<f64, I
     Ok(0.0)
 }
 
-fn number(path: &Path, node: &Node, name: &str) -> Result<f64, ImportError> {
+/// Returns whether a driving lane does not have the same width everywhere.
+fn changes_width(lane: &Node) -> bool {
+    let number = |width: &Node, name: &str| width.raw(name).and_then(|text| text.trim().parse::<f64>().ok());
+    let is_sloped = |width: &Node| ["b", "c", "d"].iter().any(|name| number(width, name).unwrap_or(0.0) != 0.0);
+    let is_driving = lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
+    is_driving && (lane.all("width").count() > 1 || lane.all("width").any(is_sloped))
+}
+
+/// Returns the speed limit (m/s), or `None` if there is none.
+fn speed_limit(path: &Path, node: &Node) -> Result<Option<f64>, ImportError> {
+    let factor = match node.raw("unit") {
+        None | Some("m/s") => 1.0,
+        Some("km/h") => 1.0 / 3.6,
+        Some("mph") => 0.44704,
+        Some(other) => {
+            return Err(node.error(path, format!("`unit` is `{other}`; one of m/s, km/h, mph is needed")));
+        }
+    };
+    if node.raw("max").is_none_or(|max| NO_LIMIT.contains(&max)) {
+        return Ok(None);
+    }
+    let limit_mps = number(path, node, "max")? * factor;
+    if !(0.0..=MOST_SPEED_LIMIT_MPS).contains(&limit_mps) {
+        let message = format!("`max` is {limit_mps} m/s; 0 to {MOST_SPEED_LIMIT_MPS} m/s, or `no limit`, is needed");
+        return Err(node.error(path, message));
+    }
+    Ok(Some(limit_mps))
+}
+
+/// Returns a finite number.
+pub(super) fn number(path: &Path, node: &Node, name: &str) -> Result<f64, ImportError> {
     let Some(text) = node.raw(name) else { return Err(node.error(path, format!("it needs `{name}`"))) };
     match text.trim().parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(number),

@@ -18,6 +18,7 @@
 //! An element without a row is refused where it is read.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use super::formula::{Values, resolve};
@@ -64,6 +65,8 @@ enum Kind {
     Number,
     /// A finite number of at least 0.
     AtLeast0,
+    /// A finite number from the first to the second.
+    Within(f64, f64),
     /// A whole number.
     Integer,
     /// A whole number of at least 0.
@@ -114,6 +117,10 @@ impl Attribute {
             Kind::AtLeast0 => match number()? {
                 number if number >= 0.0 => Ok(number.to_string()),
                 _ => Err(format!("`{name}` is `{value}`; a number of at least 0 is needed")),
+            },
+            Kind::Within(low, high) => match number()? {
+                number if (low..=high).contains(&number) => Ok(number.to_string()),
+                _ => Err(format!("`{name}` is `{value}`; a number from {low:.5} to {high:.5} is needed")),
             },
             Kind::Integer => Ok(whole(f64::from(i32::MIN))?.to_string()),
             Kind::Count => Ok(whole(0.0)?.to_string()),
@@ -196,6 +203,10 @@ const fn number(name: &'static str) -> Attribute {
 
 const fn at_least_0(name: &'static str) -> Attribute {
     Attribute { name, kind: Kind::AtLeast0 }
+}
+
+const fn within(name: &'static str, low: f64, high: f64) -> Attribute {
+    Attribute { name, kind: Kind::Within(low, high) }
 }
 
 const fn integer(name: &'static str) -> Attribute {
@@ -394,7 +405,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "FrontAxle",
         &[
-            number("maxSteering"),
+            within("maxSteering", 0.0, PI),
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -405,7 +416,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "RearAxle",
         &[
-            number("maxSteering"),
+            within("maxSteering", 0.0, PI),
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -416,7 +427,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "AdditionalAxle",
         &[
-            number("maxSteering"),
+            within("maxSteering", 0.0, PI),
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -467,13 +478,22 @@ static ELEMENTS: [Element; 150] = [
         "Weather",
         &[
             word("cloudState", &CLOUD_STATE),
-            number("atmosphericPressure"),
-            number("temperature"),
+            within("atmosphericPressure", 80_000.0, 120_000.0),
+            within("temperature", 170.0, 340.0),
             word("fractionalCloudCover", &FRACTIONAL_CLOUD_COVER),
         ],
         &["Sun", "Fog", "Precipitation", "Wind", "DomeImage"],
     ),
-    element("Sun", &[number("azimuth"), number("elevation"), at_least_0("intensity"), at_least_0("illuminance")], &[]),
+    element(
+        "Sun",
+        &[
+            within("azimuth", 0.0, 2.0 * PI),
+            within("elevation", -PI, PI),
+            at_least_0("intensity"),
+            at_least_0("illuminance"),
+        ],
+        &[],
+    ),
     element("Fog", &[at_least_0("visualRange")], &["BoundingBox"]),
     element(
         "Precipitation",
@@ -484,7 +504,7 @@ static ELEMENTS: [Element; 150] = [
         ],
         &[],
     ),
-    element("Wind", &[number("direction"), at_least_0("speed")], &[]),
+    element("Wind", &[within("direction", 0.0, 2.0 * PI), at_least_0("speed")], &[]),
     element("RoadCondition", &[at_least_0("frictionScaleFactor"), word("wetness", &WETNESS)], &["Properties"]),
     element("LongitudinalAction", &[], &["SpeedAction", "LongitudinalDistanceAction", "SpeedProfileAction"]),
     element("SpeedAction", &[], &["SpeedActionDynamics", "SpeedActionTarget"]),
@@ -797,6 +817,7 @@ mod tests {
         assert_eq!(checked("Condition", "conditionEdge", "rising").unwrap(), "rising");
         assert_eq!(checked("Condition", "delay", "${1 + 1}").unwrap(), "2");
         assert_eq!(checked("LanePosition", "laneId", "-1").unwrap(), "-1");
+        assert_eq!(checked("Sun", "elevation", "1.31").unwrap(), "1.31");
         assert_eq!(checked("ParameterCondition", "parameterRef", "late").unwrap(), "-1");
         let edge = checked("Condition", "conditionEdge", "$edge").unwrap_err();
         assert!(edge.contains("`conditionEdge` is `sharp`; one of falling, none"), "{edge}");
@@ -805,6 +826,10 @@ mod tests {
             ("Condition", "delay", "$late", "at least 0"),
             ("Condition", "delay", "NaN", "a number is needed"),
             ("LanePosition", "laneId", "-1.5", "whole number"),
+            ("Weather", "temperature", "20", "a number from 170.00000 to 340.00000"),
+            ("Sun", "elevation", "-4", "-3.14159 to 3.14159"),
+            ("Sun", "azimuth", "NaN", "a number is needed"),
+            ("FrontAxle", "maxSteering", "-0.5", "0.00000 to 3.14159"),
             ("Event", "maximumExecutionCount", "2", "must be 1"),
             ("Event", "maximumExecutionCount", "-1", "at least 0"),
             ("Event", "priority", "foo", "overwrite, override, parallel, skip"),

@@ -12,7 +12,7 @@ use super::dom::{ImportError, Node};
 use super::follow::Following;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
-use super::synchronize::Meeting;
+use super::synchronize::{ACCELERATION_MPS2, Meeting};
 use super::trajectory::nearest;
 use super::world::Vehicle;
 
@@ -25,6 +25,10 @@ const AFTER_LAST_S: f64 = 20.0;
 
 /// Highest speed of a scenario file (m/s).
 pub(super) const MOST_SPEED_MPS: f64 = 100.0;
+
+/// Largest acceleration of an action, forwards or backwards (m/s²): no tyre transmits more, as for
+/// recorded values. A `step` sets a speed at once.
+const MOST_ACCELERATION_MPS2: f64 = 12.0;
 
 /// Largest angle between a vehicle and the road at its start (rad): an assumption; 0.02 to 0.2 are
 /// plausible.
@@ -435,6 +439,11 @@ impl<'a> Storyboard<'a> {
         let to_mps = self.possible(node, to_mps)?;
         let from_mps = self.vehicles[actor].speed_mps;
         let (duration_s, is_smooth) = self.transition(dynamics, (from_mps, to_mps), 0.5 * (from_mps + to_mps))?;
+        if duration_s > 0.0 {
+            // A smooth change of speed has a higher acceleration in its middle.
+            let steepness = if is_smooth { 1.5 } else { 1.0 };
+            self.check_acceleration(dynamics, steepness * (to_mps - from_mps) / duration_s)?;
+        }
         running.is_longitudinal.push(actor);
         if let Some(Running::Relative { other, value, is_factor, .. }) = stays {
             self.vehicles[actor].speed_mps = to_mps;
@@ -444,6 +453,26 @@ impl<'a> Storyboard<'a> {
         } else {
             let begins_s = self.time_s;
             running.actions.push(Running::Speed { vehicle: actor, from_mps, to_mps, begins_s, duration_s, is_smooth });
+        }
+        Ok(())
+    }
+
+    /// Checks that a vehicle can have an acceleration, and notes if a prescribed driver has less.
+    fn check_acceleration(&mut self, node: &Node, acceleration_mps2: f64) -> Result<(), ImportError> {
+        if !(acceleration_mps2.abs() <= MOST_ACCELERATION_MPS2 + SAME) {
+            let message = format!(
+                "an acceleration of {acceleration_mps2:.2} m/s²; -{MOST_ACCELERATION_MPS2} to {MOST_ACCELERATION_MPS2} \
+                 m/s² are possible, and the shape `step` sets a speed at once"
+            );
+            return Err(self.reader.error(node, message));
+        }
+        let [hardest_mps2, largest_mps2] = ACCELERATION_MPS2;
+        if !(hardest_mps2 - SAME..=largest_mps2 + SAME).contains(&acceleration_mps2) {
+            self.notes.push(format!(
+                "line {}: an acceleration of {acceleration_mps2:.2} m/s²: a vehicle of a scenario has {hardest_mps2} to \
+                 {largest_mps2} m/s² by its driver",
+                node.line
+            ));
         }
         Ok(())
     }
@@ -494,7 +523,11 @@ impl<'a> Storyboard<'a> {
                 points.pop();
             }
             at_s += duration_s;
-            points.push((at_s, self.possible(entry, self.reader.number(entry, "speed")?)?));
+            let speed_mps = self.possible(entry, self.reader.number(entry, "speed")?)?;
+            if let Some((_, before_mps)) = points.last().filter(|_| duration_s > 0.0) {
+                self.check_acceleration(entry, (speed_mps - before_mps) / duration_s)?;
+            }
+            points.push((at_s, speed_mps));
         }
         running.is_longitudinal.push(actor);
         running.actions.push(Running::Profile { vehicle: actor, points });
@@ -771,6 +804,7 @@ impl<'a> Storyboard<'a> {
             (true, false) => leader.back_m() - distance_m - (follower.front_m() - follower.s_m),
         };
         self.vehicles[vehicle].s_m = s_m;
+        self.vehicles[vehicle].start = (node.line, node.name.clone());
         Ok(())
     }
 
@@ -826,7 +860,15 @@ impl<'a> Storyboard<'a> {
         }
         #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
         let (s_m, lane) = match node.name.as_str() {
-            "LanePosition" => self.on_lane(node)?,
+            "LanePosition" => {
+                let (s_m, lane) = self.on_lane(node)?;
+                if !(0.0..=self.road.length_m).contains(&s_m) {
+                    let message =
+                        format!("`s` is {s_m}; 0 to {} m, the length of the road, are needed", self.road.length_m);
+                    return Err(reader.error(node, message));
+                }
+                (s_m, lane)
+            }
             "WorldPosition" => self.in_plane(node, vehicle, round)?,
             "RelativeLanePosition" => {
                 let other = self.vehicle(node, "entityRef")?;
@@ -862,6 +904,7 @@ impl<'a> Storyboard<'a> {
             return if round == 0 && is_relative { Ok(()) } else { Err(reader.error(node, message)) };
         }
         let placed = &mut self.vehicles[vehicle];
+        placed.start = (node.line, node.name.clone());
         (placed.s_m, placed.lane, placed.is_placed) = (s_m, lane, true);
         Ok(())
     }

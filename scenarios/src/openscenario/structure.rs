@@ -128,9 +128,12 @@ impl Checker<'_> {
                     .ok_or_else(|| declaration.error(self.path, format!("it needs `{attribute}`")))
             });
             let (name, kind, value) = (name?, kind?, value?);
-            let value = given.get(&name).cloned().unwrap_or(value);
+            let from_outside = given.get(&name).cloned();
+            // The line is the one of the declaration, and a value from outside stands elsewhere.
+            let origin = if from_outside.is_some() { ", whose value is given from outside" } else { "" };
+            let value = from_outside.unwrap_or(value);
             check_type(&value, &kind)
-                .map_err(|message| declaration.error(self.path, format!("the {kind} `{name}`: {message}")))?;
+                .map_err(|message| declaration.error(self.path, format!("the {kind} `{name}`{origin}: {message}")))?;
             if values.insert(name.clone(), value).is_some() {
                 return Err(declaration.error(self.path, format!("a parameter `{name}` is declared before it already")));
             }

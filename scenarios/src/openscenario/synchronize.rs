@@ -20,7 +20,7 @@ use super::trajectory::nearest;
 
 /// Accelerations that a prescribed driver commands (m/s²): `MAX_BRAKING_MPS2` and
 /// `MAX_ACCELERATION_MPS2` of its module.
-const ACCELERATION_MPS2: [f64; 2] = [-9.0, 5.0];
+pub(super) const ACCELERATION_MPS2: [f64; 2] = [-9.0, 5.0];
 /// Largest distance between a master and its target at the time of its arrival, beside the tolerance
 /// of the action (m): an assumption; 0.01 to 1 are plausible.
 const MOST_APART_M: f64 = 0.1;

@@ -6,6 +6,8 @@ pub(super) struct Vehicle {
     pub(super) name: String,
     /// Line of its element in the file.
     pub(super) line: usize,
+    /// Line and name of the element that says where it starts.
+    pub(super) start: (usize, String),
     /// Class of Closecall: `car`, `truck` or `motorcycle`.
     pub(super) class: &'static str,
     pub(super) length_m: f64,
