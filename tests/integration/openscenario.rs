@@ -834,6 +834,39 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
 }
 
 #[test]
+fn a_wrong_vehicle_of_a_catalogue_is_an_error_of_the_catalogue() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let start = SCENARIO.find("<Vehicle name=\"truck\"").unwrap();
+    let end = start + SCENARIO[start..].find("</Vehicle>").unwrap() + "</Vehicle>".len();
+    let locations =
+        "<CatalogLocations><VehicleCatalog><Directory path=\"catalogs\"/></VehicleCatalog></CatalogLocations>";
+    let reference = "<CatalogReference catalogName=\"cars\" entryName=\"truck\"/>";
+    let scenario = [&SCENARIO[..start], reference, &SCENARIO[end..]].concat().replace("<CatalogLocations/>", locations);
+    let vehicle = SCENARIO[start..end].replace("<Vehicle ", "<Vehicle\n");
+    let catalog = format!("<OpenSCENARIO>\n<Catalog name=\"cars\">\n{vehicle}</Catalog></OpenSCENARIO>");
+    let path = written(folder.path(), &scenario, ROAD);
+    fs::create_dir(folder.path().join("catalogs")).unwrap();
+    let catalog_path = folder.path().join("catalogs/cars.xosc");
+    fs::write(&catalog_path, &catalog).unwrap();
+    stdout(&imported(&path, &output, &[]), 0);
+    fs::remove_file(&output).unwrap();
+    for (right, wrong, words) in [
+        ("length=\"12\"", "length=\"120\"", ["cars.xosc:7: `Dimensions`", "`length` is 120; 1 to 26 m"]),
+        ("x=\"4\"", "x=\"-1e9\"", ["cars.xosc:6: `Center`", "`x` is -1000000000; -12 to 12 m"]),
+        ("name=\"truck\"", "mass=\"1e9\" name=\"truck\"", ["cars.xosc:3: `Vehicle`", "100 to 60000 kg"]),
+        ("maxSteering=\"0\"", "maxSteering=\"9\"", ["cars.xosc:10: `RearAxle`", "0.00000 to 3.14159"]),
+    ] {
+        assert!(catalog.contains(right), "{right}");
+        fs::write(&catalog_path, catalog.replacen(right, wrong, 1)).unwrap();
+        let refused = imported(&path, &output, &[]);
+        assert_eq!(code(&refused), 3, "{wrong}");
+        assert!(words.iter().all(|word| message(&refused).contains(word)), "{}", message(&refused));
+        assert!(!output.exists(), "{wrong}");
+    }
+}
+
+#[test]
 fn an_action_ends_with_its_event_so_that_a_condition_sees_it() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");

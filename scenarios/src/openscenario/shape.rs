@@ -239,7 +239,8 @@ impl Checker<'_> {
             let curvature_per_m = (u_slope * v_bend - v_slope * u_bend) / (speed * speed * speed);
             if !(curvature_per_m.abs() <= MOST_CURVATURE_PER_M) {
                 let message = format!(
-                    "it has a curvature of {curvature_per_m} 1/m: no vehicle can follow one beyond {MOST_CURVATURE_PER_M} 1/m"
+                    "it has a curvature of {curvature_per_m} 1/m: no vehicle can follow one beyond \
+                     {MOST_CURVATURE_PER_M} 1/m"
                 );
                 return Err(shape.error(self.path, message));
             }
@@ -328,13 +329,13 @@ mod tests {
     const ROAD: &str = "<road length=\"200\">\n<type s=\"0\"/>\n<planView>\n\
         <geometry s=\"0\" x=\"5e6\" y=\"-20\" hdg=\"0\" length=\"100\"><paramPoly3 aU=\"0\" bU=\"1\" cU=\"0\" dU=\"0\" \
         aV=\"0\" bV=\"0\" cV=\"1e-4\" dV=\"0\" pRange=\"arcLength\"/></geometry>\n\
-        <geometry s=\"100\" x=\"5000100\" y=\"-19\" hdg=\"0.02\" length=\"100\"><spiral curvStart=\"0\" curvEnd=\"0.001\"/>\
-        </geometry>\n</planView>\n<elevationProfile><elevation s=\"0\" a=\"12\" b=\"0.03\" c=\"0\" d=\"0\"/>\n\
+        <geometry s=\"100\" x=\"5000100\" y=\"-19\" hdg=\"0.02\" length=\"100\"><spiral curvStart=\"0\" \
+        curvEnd=\"0.001\"/></geometry>\n</planView>\n<elevationProfile><elevation s=\"0\" a=\"12\" b=\"0.03\" c=\"0\" d=\"0\"/>\n\
         <elevation s=\"150\" a=\"16.5\" b=\"0\" c=\"1e-4\" d=\"0\"/></elevationProfile>\n\
         <lateralProfile><superelevation s=\"0\" a=\"0.04\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile>\n\
         <lanes><laneOffset s=\"0\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>\n<laneSection s=\"0\"><right>\n<lane id=\"-1\">\
-        <width sOffset=\"0\" a=\"3.5\" b=\"0.001\" c=\"0\" d=\"0\"/>\n<roadMark sOffset=\"0\"/></lane></right></laneSection>\
-        </lanes>\n<objects><object s=\"abc\"/></objects></road>";
+        <width sOffset=\"0\" a=\"3.5\" b=\"0.001\" c=\"0\" d=\"0\"/>\n<roadMark sOffset=\"0\"/></lane></right>\
+        </laneSection></lanes>\n<objects><object s=\"abc\"/></objects></road>";
 
     fn checked(text: &str) -> Result<f64, String> {
         let path = Path::new("road.xodr");
