@@ -701,6 +701,16 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
             "value=\"0.1\" dynamicsDimension=\"time\"",
             &["case.xosc:102: `SpeedActionDynamics`", "-100.00 m/s²; -12 to 12 m/s² are possible"],
         ),
+        (
+            "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"",
+            "dynamicsShape=\"linear\" value=\"-1e9\" dynamicsDimension=\"rate\"",
+            &["case.xosc:47: `SpeedActionDynamics`", "a rate of -12 to 12 m/s² is possible"],
+        ),
+        (
+            "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"",
+            "dynamicsShape=\"linear\" value=\"-1\" dynamicsDimension=\"time\"",
+            &["case.xosc:47: `SpeedActionDynamics`", "`value` is -1; a number of at least 0"],
+        ),
         ("s=\"50\"", "s=\"-1e9\"", &["case.xosc:42: `LanePosition`", "0 to 3000 m, the length of the road"]),
         ("ds=\"$Gap\"", "ds=\"1e9\"", &["case.xosc:55: `RelativeLanePosition`", "`Slow_Truck`", "s-m"]),
         ("<Center x=\"4\"", "<Center x=\"1e9\"", &["case.xosc:28: `Center`", "`x` is 1000000000; -12 to 12 m"]),

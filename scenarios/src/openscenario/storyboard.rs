@@ -444,6 +444,7 @@ impl<'a> Storyboard<'a> {
             let steepness = if is_smooth { 1.5 } else { 1.0 };
             self.check_acceleration(dynamics, steepness * (to_mps - from_mps) / duration_s)?;
         }
+        self.check_dynamics(dynamics)?;
         running.is_longitudinal.push(actor);
         if let Some(Running::Relative { other, value, is_factor, .. }) = stays {
             self.vehicles[actor].speed_mps = to_mps;
@@ -455,6 +456,25 @@ impl<'a> Storyboard<'a> {
             running.actions.push(Running::Speed { vehicle: actor, from_mps, to_mps, begins_s, duration_s, is_smooth });
         }
         Ok(())
+    }
+
+    /// Checks the value of a transition between speeds, also if the speed does not change by it.
+    fn check_dynamics(&self, node: &Node) -> Result<(), ImportError> {
+        if node.raw("dynamicsShape") == Some("step") {
+            return Ok(());
+        }
+        let value = self.reader.number(node, "value")?;
+        let is_rate = node.raw("dynamicsDimension") == Some("rate");
+        let is_possible = if is_rate { value.abs() <= MOST_ACCELERATION_MPS2 } else { value >= 0.0 };
+        match is_possible {
+            true => Ok(()),
+            false if is_rate => {
+                let limit = MOST_ACCELERATION_MPS2;
+                let message = format!("`value` is {value}; a rate of -{limit} to {limit} m/s² is possible");
+                Err(self.reader.error(node, message))
+            }
+            false => Err(self.reader.error(node, format!("`value` is {value}; a number of at least 0 is needed"))),
+        }
     }
 
     /// Checks that a vehicle can have an acceleration, and notes if a prescribed driver has less.
@@ -744,6 +764,7 @@ impl<'a> Storyboard<'a> {
                         }
                         let dynamics = inner.child("SpeedActionDynamics");
                         let shape = dynamics.and_then(|dynamics| dynamics.raw("dynamicsShape"));
+                        dynamics.map(|dynamics| self.check_dynamics(dynamics)).transpose()?;
                         if round == 1 && shape.is_some_and(|shape| shape != "step") {
                             self.notes.push(format!(
                                 "line {}: `{}` starts with the target speed, and does not come to it",
