@@ -3,6 +3,7 @@
 
 use std::fmt::Display;
 
+use closecall_campaign::boundary::BoundaryError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
 use closecall_campaign::gate::AssemblyError;
@@ -60,6 +61,8 @@ fn advice(error: &CliError) -> Option<&'static str> {
             Some("--ego NAME names the ego, --parameter NAME=VALUE gives a value, --value-set N chooses values")
         }
         CliError::Sensitivity(_) => Some("see `closecall study sensitivity --help`"),
+        CliError::Boundary(BoundaryError::Count { .. }) => Some("--along A B names both"),
+        CliError::Boundary(BoundaryError::NoBaseline { .. }) => Some("--controller NAME names the controller"),
         CliError::Boundary(_) => Some("see `closecall study boundary --help`"),
         CliError::Usage { .. } | CliError::Gates(_) | CliError::Arms(_) | CliError::Plan(_) | CliError::Causes(_) => {
             Some(ALL_OPTIONS)

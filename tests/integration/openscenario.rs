@@ -429,7 +429,7 @@ fn the_distributions_that_closecall_exports_come_back_as_distributions() {
     // The same distributions leave the scenario as it is, with the origin of each.
     let (same, said) = scenario(&case, "logical-distributions.xosc", "same.toml");
     assert_eq!(same, before);
-    assert!(said.contains("the distributions ask for `-n 1 --seed 0`"), "{said}");
+    assert!(said.contains("the distributions ask for 1 run with the random seed 0"), "{said}");
     // Other distributions replace those of the scenario.
     let (right, _) = scenario(&changed, "logical.xosc", "right.toml");
     fs::copy(changed.join("logical-distributions.xosc"), case.join("other.xosc")).unwrap();

@@ -7,8 +7,7 @@
 use std::hint::black_box;
 
 use closecall_sensors::camera::{
-    Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, HEIGHT_PX, RearCamera,
-    Resolution, WIDTH_PX,
+    Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, HEIGHT_PX, RearCamera, Resolution, WIDTH_PX,
 };
 use closecall_sensors::{Scene, SceneVehicle};
 use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};

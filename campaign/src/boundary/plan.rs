@@ -28,7 +28,7 @@ use crate::workers::{Samples, Workers};
 #[derive(Debug, thiserror::Error)]
 pub enum BoundaryError {
     /// Not two parameters are named.
-    #[error("a boundary needs two parameters, and {given} given: name both with --along")]
+    #[error("a boundary needs two parameters, and {given} given: name both")]
     Count {
         /// The number of parameters with its verb.
         given: String,
@@ -75,7 +75,7 @@ pub enum BoundaryError {
         event: String,
     },
     /// The event compares with a baseline that is not run.
-    #[error("`{event}` needs a baseline beside the controller under test: name another controller with --controller")]
+    #[error("`{event}` needs a baseline beside the controller under test: name another controller")]
     NoBaseline {
         /// The event.
         event: String,

@@ -2,18 +2,8 @@
 
 use closecall_traffic::{Lane, Side, Time};
 
+use super::dwell::is_stay;
 use crate::filters::Stay;
-
-/// Shortest time in a lane before and after a crossing.
-pub(crate) const MIN_DWELL: Time = Time::from_ms(500);
-
-/// Tolerance of the dwell time, because recorded times are rounded.
-const ROUNDING: Time = Time::from_ms(5);
-
-/// Returns true if a vehicle is long enough in a lane to stay there.
-pub(crate) fn is_stay(duration: Time) -> bool {
-    duration + ROUNDING >= MIN_DWELL
-}
 
 /// A change of the recorded lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +22,8 @@ impl Crossing {
     }
 }
 
-/// Returns the changes between two lanes if the vehicle stays in each for at least [`MIN_DWELL`].
+/// Returns the changes between two lanes if the vehicle stays in each for at least
+/// [`MIN_DWELL`](super::MIN_DWELL).
 /// Shorter stays are ignored.
 pub(super) fn crossings(stays: &[Stay]) -> Vec<Crossing> {
     let mut crossings = Vec::new();

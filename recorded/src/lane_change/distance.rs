@@ -3,7 +3,7 @@
 use closecall_traffic::{Lane, Side, Trajectory};
 
 use super::LaneChange;
-use super::crossings::MIN_DWELL;
+use super::dwell::MIN_DWELL;
 use super::geometry::LaneGeometry;
 use super::manoeuvre::{MIN_SHIFT_M, Sampled, sign};
 use crate::filters::PERIOD;

@@ -90,6 +90,7 @@ mod crossings;
 mod detect;
 mod distance;
 mod double;
+mod dwell;
 mod find;
 mod geometry;
 mod gradient;
@@ -100,8 +101,8 @@ mod score;
 
 pub use basis::DetectionBasis;
 pub use change::LaneChange;
-pub(crate) use crossings::{MIN_DWELL, is_stay};
 pub use detect::{Criterion, LaneChangeDetector, detect};
+pub(crate) use dwell::{MIN_DWELL, is_stay};
 pub use find::{FoundLaneChanges, find};
 pub use lane_reliability::LaneReliability;
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};

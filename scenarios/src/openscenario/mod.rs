@@ -34,6 +34,7 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use closecall_traffic::words::counted;
 use closecall_traffic::{Environment, Segment, input};
 
 pub use dom::ImportError;
@@ -305,9 +306,10 @@ fn of_closecall(
     if let Some((stochastic, source)) = distributions {
         let (replaced, replaced_notes) = replaced::with_distributions(&file, stochastic, source)?;
         whole = replaced;
+        let runs = counted(stochastic.runs, "run");
         notes.push(match stochastic.seed {
-            Some(seed) => format!("the distributions ask for `-n {} --seed {seed}`", stochastic.runs),
-            None => format!("the distributions ask for `-n {}`, and for no random seed", stochastic.runs),
+            Some(seed) => format!("the distributions ask for {runs} with the random seed {seed}"),
+            None => format!("the distributions ask for {runs}, and for no random seed"),
         });
         notes.extend(replaced_notes);
     }

@@ -10,10 +10,10 @@ use std::f64::consts::PI;
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
 use super::follow::Following;
+use super::plane::nearest;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
 use super::synchronize::{ACCELERATION_MPS2, Meeting};
-use super::trajectory::nearest;
 use super::world::Vehicle;
 
 /// Step of the storyboard (s): the step of esmini's tests.

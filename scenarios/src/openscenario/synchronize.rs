@@ -15,8 +15,8 @@
 //! driver does not.
 
 use super::dom::{ImportError, Node};
+use super::plane::nearest;
 use super::storyboard::{LONGEST_S, MOST_SPEED_MPS, STEP_S, Storyboard};
-use super::trajectory::nearest;
 
 /// Accelerations that a prescribed driver commands (m/s²): `MAX_BRAKING_MPS2` and
 /// `MAX_ACCELERATION_MPS2` of its module.

@@ -10,7 +10,7 @@
 //! the two centres in the same time.
 
 use super::dom::{ImportError, Node};
-use super::plane::RoadPoint;
+use super::plane::{RoadPoint, nearest};
 use super::storyboard::{LaneChange, MOST_SPEED_MPS, STEP_S, Storyboard};
 
 /// Share of the duration of a lane change of a scenario between 10 % and 90 % of its way: of the
@@ -160,11 +160,6 @@ impl Storyboard<'_> {
         }
         Ok(())
     }
-}
-
-/// Returns the index of the lane whose centre is nearest.
-pub(super) fn nearest(centres_m: &[f64], t_m: f64) -> Option<usize> {
-    (0..centres_m.len()).min_by(|a, b| (centres_m[*a] - t_m).abs().total_cmp(&(centres_m[*b] - t_m).abs()))
 }
 
 /// Returns the speeds at the vertices and in the middle between them (m/s). In the middle it is the

@@ -17,8 +17,7 @@ use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
 use super::lanes::{mean, through_air};
 use super::line::Line;
 use super::mesh::{Texture, Vec3, dot, each};
-use super::picture::Resolution;
-use super::pinhole::PixelRect;
+use super::picture::{PixelRect, Resolution};
 use super::raster::Lattice;
 use super::sky;
 

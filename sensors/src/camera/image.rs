@@ -1,7 +1,7 @@
 //! Image types: the whole image, the crop that the classifier receives, and an image with its
 //! ground truth.
 
-use super::pinhole::PixelRect;
+use super::picture::PixelRect;
 
 /// Side of the classifier's input (px).
 pub const CROP_PX: usize = 32;

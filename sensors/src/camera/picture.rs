@@ -11,8 +11,6 @@ use closecall_traffic::{Check, ConfigError, Parameters, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::pinhole::PixelRect;
-
 /// Width of the usual image (px).
 pub const WIDTH_PX: u16 = 1280;
 
@@ -98,6 +96,30 @@ impl Resolution {
         }
         let usual = (i64::from(pixel) * i64::from(WIDTH_PX)).div_euclid(i64::from(self.width_px));
         i32::try_from(usual).unwrap_or(pixel)
+    }
+}
+
+/// A rectangle of pixels, which may extend beyond the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRect {
+    /// Leftmost column.
+    pub left: i32,
+    /// Topmost row.
+    pub top: i32,
+    /// Number of columns.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+}
+
+impl PixelRect {
+    /// Returns the share of the rectangle's area that lies in an image of this size (0 to 1).
+    pub fn share_in_image(&self, image: Resolution) -> f64 {
+        let overlap = |start: i32, extent: u32, limit: u16| {
+            let end = i64::from(start) + i64::from(extent);
+            (end.min(limit.into()) - i64::from(start.max(0))).max(0) as f64 / f64::from(extent.max(1))
+        };
+        overlap(self.left, self.width, image.width_px) * overlap(self.top, self.height, image.height_px)
     }
 }
 

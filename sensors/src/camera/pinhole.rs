@@ -19,35 +19,11 @@ use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::Camera;
 use super::optics::Optics;
-use super::picture::Resolution;
+use super::picture::{PixelRect, Resolution};
 
 /// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body
 /// lies there.
 pub(crate) const NEAR_M: f64 = 0.3;
-
-/// A rectangle of pixels, which may extend beyond the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelRect {
-    /// Leftmost column.
-    pub left: i32,
-    /// Topmost row.
-    pub top: i32,
-    /// Number of columns.
-    pub width: u32,
-    /// Number of rows.
-    pub height: u32,
-}
-
-impl PixelRect {
-    /// Returns the share of the rectangle's area that lies in an image of this size (0 to 1).
-    pub fn share_in_image(&self, image: Resolution) -> f64 {
-        let overlap = |start: i32, extent: u32, limit: u16| {
-            let end = i64::from(start) + i64::from(extent);
-            (end.min(limit.into()) - i64::from(start.max(0))).max(0) as f64 / f64::from(extent.max(1))
-        };
-        overlap(self.left, self.width, image.width_px) * overlap(self.top, self.height, image.height_px)
-    }
-}
 
 /// A box that stands on the ground, in the ego's vehicle frame, as a detection describes it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,8 @@
 
 use super::exposure::ExposureKey;
 use super::image::{Crop, LabelledImage};
-use super::pinhole::{GroundBox, Lens, NEAR_M, PixelRect};
+use super::picture::PixelRect;
+use super::pinhole::{GroundBox, Lens, NEAR_M};
 use super::{Camera, Frame};
 use closecall_traffic::{Scene, SceneVehicle};
 
