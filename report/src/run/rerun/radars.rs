@@ -65,7 +65,7 @@ fn write_radar(
             column(name, Arc::new(values), &lengths)
         };
         let exists: BooleanArray = all().map(|one| Some(one.source.exists())).collect();
-        let vehicles = StringArray::from_iter_values(all().map(|one| vehicle(film, one.source)));
+        let vehicles = StringArray::from_iter_values(all().map(|one| vehicle(film, one.source)).collect::<Vec<_>>());
         let measured = [
             numbers("range_m", |measured| measured.range_m)?,
             numbers("azimuth_rad", |measured| measured.azimuth_rad)?,
