@@ -164,7 +164,7 @@ mod tests {
         };
         let svg = boundary_map(&map).unwrap();
         for (colour, what) in
-            [("#E67E22", "failed"), ("#B5BFCA", "passed"), ("#111111", "no value"), ("#D35400", "area")]
+            [("#DE7717", "failed"), ("#7D8895", "passed"), ("#111111", "no value"), ("#D35400", "area")]
         {
             assert!(svg.contains(colour), "{what}: {svg}");
         }
