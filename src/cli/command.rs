@@ -256,7 +256,8 @@ fn negative_number(named: &str, arguments: &[std::ffi::OsString]) -> Option<Stri
     };
     let at = words.iter().position(|word| word.starts_with(named) && is_number(word))?;
     let before = words.get(at.checked_sub(1)?)?;
-    let is_option = before.starts_with('-') && before.len() > 1 && !is_number(before);
+    // An option that has its value already, `--seed=1`, takes no other one.
+    let is_option = before.starts_with('-') && before.len() > 1 && !before.contains('=') && !is_number(before);
     let expected = if is_option { format!("'{before}' takes") } else { "this command takes".to_owned() };
     Some(format!("unexpected argument '{}': {expected} no number below 0", words[at]))
 }
