@@ -30,7 +30,17 @@ pub(super) fn cells(slice: &Slice) -> [String; 2] {
     let undecided: Vec<String> =
         slice.undecided.iter().map(|[low, high]| format!("{} to {}", number(*low), number(*high))).collect();
     let text = match slice.fails {
-        None => slice.crossings.iter().map(crossing).collect::<Vec<_>>().join(", "),
+        None => {
+            let crossings = slice.crossings.iter().map(crossing).collect::<Vec<_>>().join(", ");
+            // The text of a crossing has its interval.
+            let is_of_crossing = |ends: &[f64; 2]| slice.crossings.iter().any(|crossing| crossing.interval_95 == *ends);
+            let others = slice.undecided.iter().zip(&undecided).filter(|range| !is_of_crossing(range.0));
+            let others: Vec<&str> = others.map(|(_, text)| text.as_str()).collect();
+            match &others[..] {
+                [] => crossings,
+                ranges => format!("{crossings}; also undecided from {}", ranges.join(", ")),
+            }
+        }
         Some(fails) => {
             let side = if fails { "happens" } else { "does not happen" };
             let sure = match &undecided[..] {
