@@ -48,6 +48,13 @@ pub enum Doubt {
     StartSigns(LeaveOneOut),
     /// Too much of the area is undecided.
     Undecided(Area),
+    /// The event happens in runs whose margin is 0: their sign does not say so.
+    OnBound {
+        /// The number of such runs.
+        on_bound: usize,
+        /// The number of runs with a margin.
+        runs: usize,
+    },
 }
 
 impl fmt::Display for Doubt {
@@ -73,6 +80,10 @@ impl fmt::Display for Doubt {
                 "{} of the area is undecided; at most {} is allowed",
                 percent(area.undecided),
                 percent(LARGEST_UNDECIDED)
+            ),
+            Self::OnBound { on_bound, runs } => write!(
+                f,
+                "in {on_bound} of {runs} runs the number is equal to the bound, and the event happens: there the number has no distance from the bound"
             ),
         }
     }

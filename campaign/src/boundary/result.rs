@@ -75,6 +75,8 @@ impl Boundary {
             happens: value.map(|value| plan.event.happens(value)),
             is_start: index < START_RUNS,
         };
+        let runs: Vec<Ran> = searched.points.iter().zip(values).enumerate().map(ran).collect();
+        let surveyed = surveyed(searched, &runs, ranges);
         Self {
             scenario: plan.file.config().name.clone(),
             seed: plan.seed,
@@ -85,9 +87,9 @@ impl Boundary {
             quantity: plan.event.quantity.to_string(),
             keys: [0, 1].map(|axis| plan.axes[axis].key.clone()),
             ranges,
-            runs: searched.points.iter().zip(values).enumerate().map(ran).collect(),
+            runs,
             errors,
-            surveyed: surveyed(searched, ranges),
+            surveyed,
         }
     }
 
@@ -110,10 +112,34 @@ impl Boundary {
     }
 }
 
-fn surveyed(searched: &Searched, ranges: [[f64; 2]; 2]) -> Option<Surveyed> {
+fn surveyed(searched: &Searched, runs: &[Ran], ranges: [[f64; 2]; 2]) -> Option<Surveyed> {
     let (surface, indices) = searched.surface()?;
     let margins: Vec<f64> = searched.margins.iter().flatten().copied().collect();
     let check = LeaveOneOut::new(&surface.leave_one_out(), &margins, &indices);
     let (map, area) = map(&surface);
-    Some(Surveyed { slices: slices(&surface, ranges), area, map, check, doubts: check.doubts(area) })
+    let mut doubts = check.doubts(area);
+    let on_bound = on_bound(runs, &searched.margins);
+    doubts.extend((on_bound > 0).then_some(Doubt::OnBound { on_bound, runs: margins.len() }));
+    Some(Surveyed { slices: slices(&surface, ranges), area, map, check, doubts })
+}
+
+/// Returns the number of runs in which the event happens with a margin of 0. A smallest gap is 0 in
+/// each collision, for example, so that `min_gap_rear_m <= 0` has no negative margin.
+fn on_bound(runs: &[Ran], margins: &[Option<f64>]) -> usize {
+    let is_on_bound = |(run, margin): &(&Ran, &Option<f64>)| run.happens == Some(true) && **margin == Some(0.0);
+    runs.iter().zip(margins).filter(is_on_bound).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_event_that_happens_at_its_bound_is_a_reason_to_doubt_the_surface() {
+        let run = |happens| Ran { at: [0.0, 0.0], value: Some(0.0), happens: Some(happens), is_start: true };
+        let runs = [true, true, false, true].map(run);
+        assert_eq!(on_bound(&runs, &[Some(0.0), Some(-0.0), Some(0.0), Some(-1.0)]), 2);
+        let doubt = Doubt::OnBound { on_bound: 2, runs: 4 }.to_string();
+        assert!(doubt.starts_with("in 2 of 4 runs the number is equal to the bound"), "{doubt}");
+    }
 }

@@ -20,8 +20,9 @@ use friedrich::prior::ConstantPrior;
 /// says little more than its runs.
 pub(super) const FEWEST: usize = 10;
 
-/// Standard deviations of the noise that are tried, as shares of the standard deviation of the
-/// margins: none but for rounding, and up to a third.
+/// Standard deviations of the noise with which a fit begins, as shares of the standard deviation of
+/// the margins: none but for rounding, and up to a third. The fit multiplies the noise by the same
+/// factors as the amplitude of the kernel.
 const NOISES: [f64; 4] = [0.001, 0.03, 0.1, 0.3];
 /// Ratios of the two lengths that are tried.
 const RATIOS: [f64; 5] = [1.0, 0.25, 0.5, 2.0, 4.0];
@@ -145,6 +146,9 @@ fn best(candidates: impl Iterator<Item = Candidate>) -> Option<Candidate> {
     candidates.reduce(|best, next| if next.score > best.score { next } else { best })
 }
 
+/// Share of the largest margin below which margins differ by rounding alone.
+const ROUNDING: f64 = 1e-12;
+
 /// Smallest variance of a prediction (standard deviations of the margins, squared): rounding makes
 /// some negative.
 const SMALLEST_VARIANCE: f64 = 1e-16;
@@ -158,7 +162,7 @@ fn predict(process: &GaussianProcess<Matern1, ConstantPrior>, points: Vec<Vec<f6
 
 impl Surface {
     /// Fits a surface to margins at points of the unit square. `None` for fewer than [`FEWEST`]
-    /// points, and for margins that are all equal.
+    /// points, and for margins that are all equal but for rounding.
     pub(super) fn fit(points: &[[f64; 2]], margins: &[f64]) -> Option<Self> {
         if points.len() < FEWEST || margins.len() != points.len() {
             return None;
@@ -166,7 +170,8 @@ impl Surface {
         let count = margins.len() as f64;
         let mean = margins.iter().sum::<f64>() / count;
         let scale = (margins.iter().map(|margin| (margin - mean) * (margin - mean)).sum::<f64>() / count).sqrt();
-        if !(scale > 0.0 && scale.is_finite()) {
+        let largest = margins.iter().fold(0.0_f64, |largest, margin| largest.max(margin.abs()));
+        if !(scale > ROUNDING * largest && scale.is_finite()) {
             return None;
         }
         let values: Vec<f64> = margins.iter().map(|margin| margin / scale).collect();
@@ -238,6 +243,9 @@ mod tests {
     fn too_few_runs_and_equal_margins_have_no_surface() {
         assert!(Surface::fit(&points(9), &[1.0; 9]).is_none());
         assert!(Surface::fit(&points(20), &[1.0; 20]).is_none());
+        // The mean of these numbers is rounded, and differs from each of them.
+        assert!(Surface::fit(&points(60), &[-0.1; 60]).is_none());
+        assert!(Surface::fit(&points(20), &[0.0; 20]).is_none());
         let margins: Vec<f64> = (0..20).map(f64::from).collect();
         assert!(Surface::fit(&points(20), &[&margins[..19], &[f64::NAN]].concat()).is_none());
         assert!(Surface::fit(&points(20), &margins).is_some());
