@@ -2,10 +2,8 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use closecall_scenarios::criteria::{Event, EventExpression};
-use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{ScenarioError, ScenarioFile, SettingError};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
@@ -18,11 +16,11 @@ use super::result::Boundary;
 use super::search::{Margins, search};
 use crate::campaign_error::WorkersError;
 use crate::gate::value;
-use crate::record::{ArmRecord, Record, SampleFailure};
-use crate::runner::{ArmRun, OnOutcome, guarded, run_guarded};
+use crate::record::{Record, SampleFailure};
+use crate::runner::{guarded, run_guarded};
 use crate::sensitivity::{FactorRange, RunErrors};
 use crate::stop::StopFlag;
-use crate::workers::{Samples, Workers};
+use crate::workers::{Samples, UncheckedSamples, Workers};
 
 /// A boundary that cannot be planned or run.
 #[derive(Debug, thiserror::Error)]
@@ -68,7 +66,7 @@ pub enum BoundaryError {
     },
     /// The event is a difference of two.
     #[error(
-        "`{event}` is a difference of two events: a boundary is that of one number with a bound, such as `min_gap_rear_m < 0.5`"
+        "`{event}` is a difference of two events: a boundary needs one number with a bound, such as `min_gap_rear_m < 0.5`"
     )]
     Difference {
         /// The events.
@@ -80,9 +78,9 @@ pub enum BoundaryError {
         /// The event.
         event: String,
     },
-    /// A controller from outside reports the number of itself.
+    /// A controller from outside reports the number about itself.
     #[error(
-        "`{event}`: a controller from outside reports the number of itself: name a measured one, such as min_gap_rear_m"
+        "`{event}`: a controller from outside reports this number about itself: name a measured number, such as min_gap_rear_m"
     )]
     Reported {
         /// The event.
@@ -169,7 +167,7 @@ impl BoundaryPlan {
         let mut values: Vec<Option<f64>> = Vec::new();
         let evaluate = |points: &[[f64; 2]]| -> Result<Option<Margins>, WorkersError> {
             let begin = values.len();
-            let runs = Arc::new(Points { plan: self.clone(), points: points.to_vec() });
+            let runs = Arc::new(self.samples(points));
             self.workers.run_samples(&runs, 0..points.len() as u64, stop, |finished| {
                 values.push(self.value(&finished.record, &mut errors));
                 on_run();
@@ -187,10 +185,23 @@ impl BoundaryPlan {
         let failures: Vec<&SampleFailure> = record.arms.iter().filter_map(|arm| arm.result.as_ref().err()).collect();
         errors.points += u64::from(!failures.is_empty());
         for failure in &failures {
-            let first = || (0, failure.message.clone());
-            errors.kinds.entry(failure.kind.clone()).or_insert_with(first).0 += 1;
+            errors.add_failure(failure);
         }
         if failures.is_empty() { value(self.event.quantity, record).filter(|value| value.is_finite()) } else { None }
+    }
+
+    /// Returns points of the unit square, ready to run.
+    fn samples(&self, points: &[[f64; 2]]) -> impl Samples + use<> {
+        let (plan, points) = (self.clone(), points.to_vec());
+        UncheckedSamples::new(&self.file, self.arms.clone(), move |sample: u64, arm: &Arm| {
+            let fail = |message: String| SampleFailure { kind: "scenario".to_owned(), message };
+            let point = usize::try_from(sample).ok().and_then(|index| points.get(index));
+            let point = point.ok_or_else(|| fail("there is no such point".to_owned()))?;
+            let file = at(&plan.file, &plan.axes, *point).map_err(|error| fail(error.to_string()))?;
+            let scenario = guarded(|| file.config().check(&file.space().nominal()).map_err(SampleError::Scenario))?;
+            let key = RunKey { seed: plan.seed, sample: plan.sample };
+            Ok(run_guarded(&scenario, key, arm, &mut NoObserver)?)
+        })
     }
 
     /// Returns the margin of a value: positive if the event does not happen.
@@ -254,42 +265,6 @@ fn values_failure(axes: &[FactorRange; 2], point: [f64; 2], source: ScenarioErro
     let values =
         axes.iter().zip(point).map(|(axis, u)| axis.at(u).map_or_else(|_| axis.key.clone(), |set| set.to_string()));
     BoundaryError::Values { at: values.collect::<Vec<_>>().join(" and "), source: Box::new(source) }
-}
-
-/// Points of the unit square, ready to run.
-struct Points {
-    plan: BoundaryPlan,
-    points: Vec<[f64; 2]>,
-}
-
-impl Points {
-    /// Runs a point in one arm.
-    fn outcome(&self, index: u64, arm: &Arm) -> Result<Outcome, SampleFailure> {
-        let fail = |message: String| SampleFailure { kind: "scenario".to_owned(), message };
-        let point = usize::try_from(index).ok().and_then(|index| self.points.get(index));
-        let point = point.ok_or_else(|| fail("there is no such point".to_owned()))?;
-        let file = at(&self.plan.file, &self.plan.axes, *point).map_err(|error| fail(error.to_string()))?;
-        let scenario = guarded(|| file.config().check(&file.space().nominal()).map_err(SampleError::Scenario))?;
-        let key = RunKey { seed: self.plan.seed, sample: self.plan.sample };
-        Ok(run_guarded(&scenario, key, arm, &mut NoObserver)?)
-    }
-}
-
-impl Samples for Points {
-    fn scenario(&self) -> &str {
-        &self.plan.file.config().name
-    }
-
-    fn arms(&self) -> &[Arm] {
-        &self.plan.arms
-    }
-
-    fn run(&self, sample: u64, arm: usize, _: Duration, _: &OnOutcome<'_>) -> ArmRun {
-        let (arm, started) = (&self.plan.arms[arm], Instant::now());
-        let result = self.outcome(sample, arm);
-        let record = ArmRecord::new(arm.controller.name().to_owned(), result);
-        ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 }
-    }
 }
 
 #[cfg(test)]
