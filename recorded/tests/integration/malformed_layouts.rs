@@ -103,7 +103,7 @@ fn malformed_highd_data_sets_are_rejected() {
         (data, "7,25,", "7,0,", vec!["07_recordingMeta.csv, line 2", "`frameRate`", "1 to 1000"]),
         (data, "7,25,", "7,nan,", vec!["line 2", "`frameRate`", "is `nan`"]),
         // A wrong frame rate: the positions then move at another speed than recorded.
-        (data, "7,25,", "7,50,", vec!["07_tracks.csv, line", "0.6 to 1.6"]),
+        (data, "7,25,", "7,50,", vec!["07_tracks.csv: ", "0.6 to 1.6", "`frameRate`"]),
         (data, "21.0;25.0;29.0", "29.0;25.0;21.0", vec!["`lowerLaneMarkings`", "rising"]),
         (data, "21.0;25.0;29.0", "", vec!["07_tracks.csv, line 2", "lowerLaneMarkings"]),
         (data, "\n7,25", "\n8,25,,1;2\n7,25", vec!["2 rows, but 1 is needed"]),

@@ -19,7 +19,7 @@ use closecall_traffic::{Scene, SceneVehicle, maths};
 
 use super::Camera;
 use super::optics::Optics;
-use super::picture::{PixelRect, Resolution};
+use super::picture::Resolution;
 
 /// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body
 /// lies there.
@@ -229,7 +229,7 @@ mod tests {
     use super::*;
     use crate::camera::CameraConfig;
     use crate::camera::FOCAL_PX;
-    use crate::camera::picture::{FIELD_OF_VIEW_RAD, ResolutionConfig, WIDTH_PX};
+    use crate::camera::picture::{FIELD_OF_VIEW_RAD, PixelRect, ResolutionConfig, WIDTH_PX};
     use closecall_traffic::{Check, Parameters};
 
     fn lens(pitch_rad: f64) -> Lens {
