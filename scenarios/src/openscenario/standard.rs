@@ -405,7 +405,8 @@ static ELEMENTS: [Element; 150] = [
     element(
         "FrontAxle",
         &[
-            within("maxSteering", 0.0, PI),
+            // The standard allows up to π; many files state degrees, and nothing uses it.
+            at_least_0("maxSteering"),
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -416,7 +417,8 @@ static ELEMENTS: [Element; 150] = [
     element(
         "RearAxle",
         &[
-            within("maxSteering", 0.0, PI),
+            // The standard allows up to π; many files state degrees, and nothing uses it.
+            at_least_0("maxSteering"),
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -427,7 +429,8 @@ static ELEMENTS: [Element; 150] = [
     element(
         "AdditionalAxle",
         &[
-            within("maxSteering", 0.0, PI),
+            // The standard allows up to π; many files state degrees, and nothing uses it.
+            at_least_0("maxSteering"),
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -818,6 +821,7 @@ mod tests {
         assert_eq!(checked("Condition", "delay", "${1 + 1}").unwrap(), "2");
         assert_eq!(checked("LanePosition", "laneId", "-1").unwrap(), "-1");
         assert_eq!(checked("Sun", "elevation", "1.31").unwrap(), "1.31");
+        assert_eq!(checked("FrontAxle", "maxSteering", "30").unwrap(), "30", "degrees, as many files state them");
         assert_eq!(checked("ParameterCondition", "parameterRef", "late").unwrap(), "-1");
         let edge = checked("Condition", "conditionEdge", "$edge").unwrap_err();
         assert!(edge.contains("`conditionEdge` is `sharp`; one of falling, none"), "{edge}");
@@ -829,7 +833,7 @@ mod tests {
             ("Weather", "temperature", "20", "a number from 170.00000 to 340.00000"),
             ("Sun", "elevation", "-4", "-3.14159 to 3.14159"),
             ("Sun", "azimuth", "NaN", "a number is needed"),
-            ("FrontAxle", "maxSteering", "-0.5", "0.00000 to 3.14159"),
+            ("FrontAxle", "maxSteering", "-0.5", "at least 0"),
             ("Event", "maximumExecutionCount", "2", "must be 1"),
             ("Event", "maximumExecutionCount", "-1", "at least 0"),
             ("Event", "priority", "foo", "overwrite, override, parallel, skip"),
