@@ -100,7 +100,8 @@ impl OutsideCamera {
         }
         let imaged = self.exposures.imaged(scene);
         let lists = std::mem::take(&mut self.lists);
-        let mut frame = Frame::with_buffers(lists, &self.camera, &imaged, exposure.key, &[self.camera.resolution.image()]);
+        let whole = [self.camera.resolution.image()];
+        let mut frame = Frame::with_buffers(lists, &self.camera, &imaged, exposure.key, &whole);
         if let Some(fault) = &exposure.fault {
             frame.add_glare(fault, &imaged);
         }
