@@ -285,6 +285,10 @@ const STORYBOARD_ELEMENT_STATE: [&str; 7] = [
 ];
 const STORYBOARD_ELEMENT_TYPE: [&str; 6] = ["act", "action", "event", "maneuver", "maneuverGroup", "story"];
 
+/// Largest steering angle of an axle. The standard allows 0 to π rad. Many files state degrees, and
+/// the import has no use for it.
+const MAX_STEERING: Attribute = at_least_0("maxSteering");
+
 /// The type `TransitionDynamics` of the standard.
 const TRANSITION_DYNAMICS: [Attribute; 4] = [
     word("dynamicsDimension", &DYNAMICS_DIMENSION),
@@ -405,8 +409,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "FrontAxle",
         &[
-            // The standard allows up to π; many files state degrees, and nothing uses it.
-            at_least_0("maxSteering"),
+            MAX_STEERING,
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -417,8 +420,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "RearAxle",
         &[
-            // The standard allows up to π; many files state degrees, and nothing uses it.
-            at_least_0("maxSteering"),
+            MAX_STEERING,
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -429,8 +431,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "AdditionalAxle",
         &[
-            // The standard allows up to π; many files state degrees, and nothing uses it.
-            at_least_0("maxSteering"),
+            MAX_STEERING,
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
