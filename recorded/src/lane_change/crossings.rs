@@ -10,7 +10,7 @@ pub(crate) const MIN_DWELL: Time = Time::from_ms(500);
 /// Tolerance of the dwell time, because recorded times are rounded.
 const ROUNDING: Time = Time::from_ms(5);
 
-/// Returns true if a stay of this duration counts: the vehicle does not only touch the lane.
+/// Returns true if a vehicle is long enough in a lane to stay there.
 pub(crate) fn is_stay(duration: Time) -> bool {
     duration + ROUNDING >= MIN_DWELL
 }
