@@ -100,8 +100,7 @@ impl OutsideCamera {
         }
         let imaged = self.exposures.imaged(scene);
         let lists = std::mem::take(&mut self.lists);
-        let whole = [self.camera.resolution.image()];
-        let mut frame = Frame::with_buffers(lists, &self.camera, &imaged, exposure.key, &whole);
+        let mut frame = Frame::with_buffers(lists, &self.camera, &imaged, exposure.key, &[self.camera.resolution.image()]);
         if let Some(fault) = &exposure.fault {
             frame.add_glare(fault, &imaged);
         }
