@@ -285,6 +285,10 @@ const STORYBOARD_ELEMENT_STATE: [&str; 7] = [
 ];
 const STORYBOARD_ELEMENT_TYPE: [&str; 6] = ["act", "action", "event", "maneuver", "maneuverGroup", "story"];
 
+/// Largest steering angle of an axle. The standard allows 0 to π rad. Many files state degrees, and
+/// the import has no use for it.
+const MAX_STEERING: Attribute = at_least_0("maxSteering");
+
 /// The type `TransitionDynamics` of the standard.
 const TRANSITION_DYNAMICS: [Attribute; 4] = [
     word("dynamicsDimension", &DYNAMICS_DIMENSION),
@@ -405,7 +409,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "FrontAxle",
         &[
-            within("maxSteering", 0.0, PI),
+            MAX_STEERING,
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -416,7 +420,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "RearAxle",
         &[
-            within("maxSteering", 0.0, PI),
+            MAX_STEERING,
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -427,7 +431,7 @@ static ELEMENTS: [Element; 150] = [
     element(
         "AdditionalAxle",
         &[
-            within("maxSteering", 0.0, PI),
+            MAX_STEERING,
             number("positionX"),
             number("positionZ"),
             at_least_0("trackWidth"),
@@ -818,6 +822,7 @@ mod tests {
         assert_eq!(checked("Condition", "delay", "${1 + 1}").unwrap(), "2");
         assert_eq!(checked("LanePosition", "laneId", "-1").unwrap(), "-1");
         assert_eq!(checked("Sun", "elevation", "1.31").unwrap(), "1.31");
+        assert_eq!(checked("FrontAxle", "maxSteering", "30").unwrap(), "30", "degrees, as many files state them");
         assert_eq!(checked("ParameterCondition", "parameterRef", "late").unwrap(), "-1");
         let edge = checked("Condition", "conditionEdge", "$edge").unwrap_err();
         assert!(edge.contains("`conditionEdge` is `sharp`; one of falling, none"), "{edge}");
@@ -829,7 +834,7 @@ mod tests {
             ("Weather", "temperature", "20", "a number from 170.00000 to 340.00000"),
             ("Sun", "elevation", "-4", "-3.14159 to 3.14159"),
             ("Sun", "azimuth", "NaN", "a number is needed"),
-            ("FrontAxle", "maxSteering", "-0.5", "0.00000 to 3.14159"),
+            ("FrontAxle", "maxSteering", "-0.5", "at least 0"),
             ("Event", "maximumExecutionCount", "2", "must be 1"),
             ("Event", "maximumExecutionCount", "-1", "at least 0"),
             ("Event", "priority", "foo", "overwrite, override, parallel, skip"),

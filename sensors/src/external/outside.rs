@@ -49,8 +49,8 @@ impl Outside {
         }
     }
 
-    /// Asks the program about scans of the LiDARs and of the radars, and an image of the scene. `believed` is the scene as the ego
-    /// believes it to be.
+    /// Asks the program about scans of the LiDARs and of the radars, and an image of the scene.
+    /// `believed` is the scene as the ego believes it to be.
     ///
     /// # Errors
     /// [`SensorError::Program`] if there is no valid answer.

@@ -208,7 +208,6 @@ impl Effects for RadarFault {
     }
 
     fn effects(&self) -> Vec<String> {
-        // It starts no track: `has_ghost` stays false.
         let ghost =
             self.ghost.map(|[gap_m, _]| format!("detects a ghost {gap_m:.0} m away, a vehicle that does not exist"));
         those([

@@ -23,8 +23,7 @@
 //!   reversed (Kraus et al. 2020, *Using machine learning to detect ghost images in automotive
 //!   radar*, arXiv 2007.05280: such images are usual at flat surfaces).
 //! - **Neglected** are the yaw rate of the ego times the lever arm of the sensor (0.1 m/s in a bend
-//!   of 1000 m at 40 m/s), clutter, interference, and
-//!   weather except rain.
+//!   of 1000 m at 40 m/s), clutter, interference, and weather except rain.
 //!
 //! The radars start no tracks. They correct the speed of tracks that the LiDARs have
 //! ([`crate::tracking::RadarScan`]).
