@@ -35,6 +35,8 @@ const MOST_ACCELERATION_MPS2: f64 = 12.0;
 const MOST_START_ANGLE_RAD: f64 = 0.1;
 /// Distance from the centre of a lane above which a note says so (m): numerical.
 const NOTED_OFFSET_M: f64 = 0.01;
+/// Largest distance beyond an end of the road (m): lengths and positions are rounded in files.
+const ROUNDING_M: f64 = 0.01;
 
 /// Difference of two values that are the same but for rounding: numerical.
 const SAME: f64 = 1e-9;
@@ -883,12 +885,12 @@ impl<'a> Storyboard<'a> {
         let (s_m, lane) = match node.name.as_str() {
             "LanePosition" => {
                 let (s_m, lane) = self.on_lane(node)?;
-                if !(0.0..=self.road.length_m).contains(&s_m) {
+                if !(-ROUNDING_M..=self.road.length_m + ROUNDING_M).contains(&s_m) {
                     let message =
                         format!("`s` is {s_m}; 0 to {} m, the length of the road, are needed", self.road.length_m);
                     return Err(reader.error(node, message));
                 }
-                (s_m, lane)
+                (s_m.clamp(0.0, self.road.length_m), lane)
             }
             "WorldPosition" => self.in_plane(node, vehicle, round)?,
             "RelativeLanePosition" => {

@@ -416,7 +416,7 @@ mod tests {
         assert!(refusal("r157-drivr").ends_with("; did you mean `r157-driver`?"));
         assert!(refusal("gap-3.0").contains("0.8 to 2.5 s in steps of 0.1 s"));
         assert!(refusal("acc+abs").contains("`acc+aeb`"), "{}", refusal("acc+abs"));
-        assert!(refusal("acc:aeb.trigger-mps2=50").contains("no setting of the ego stack"));
+        assert!(refusal("acc:aeb.trigger-mps2=50").contains("cannot be set in an arm"));
         assert!(refusal("exec:").contains("it is empty"));
         assert!(refusal("lib:").contains("names no file"));
     }
