@@ -471,7 +471,7 @@ def test_exit_codes_of_the_command(tmp_path: Path) -> None:
         ({"max_collision": 3}, "no keyword `max_collision`"),
         ({"paired": True, "controller": "acc"}, "paired= compares"),
         ({"arms": ["acc", "mis"], "paired": True}, "leave out `controller` and `paired`"),
-        ({"n": 0}, "no sample at all"),
+        ({"n": 0}, "a whole number of 1 or more is needed"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
