@@ -430,7 +430,7 @@ fn the_distributions_that_closecall_exports_come_back_as_distributions() {
     let (same, said) = scenario(&case, "logical-distributions.xosc", "same.toml");
     assert_eq!(same, before);
     assert!(said.contains("the distributions ask for 1 run with the random seed 0"), "{said}");
-    // Other distributions replace those of the scenario.
+    // Other distributions replace the ones in the scenario.
     let (right, _) = scenario(&changed, "logical.xosc", "right.toml");
     fs::copy(changed.join("logical-distributions.xosc"), case.join("other.xosc")).unwrap();
     let (other, said) = scenario(&case, "other.xosc", "other.toml");
@@ -922,7 +922,7 @@ fn the_stop_trigger_of_an_act_ends_the_events_of_that_act_alone() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
     let said = stdout(&imported(&written(folder.path(), &with_two_acts(), ROAD), &output, &[]), 0);
-    // An event that overwrites those of its manoeuvre does not touch a manoeuvre of the same name.
+    // An event overwrites the others of its manoeuvre, and none of another manoeuvre with the same name.
     assert!((time_of(&said, "slow-down begins") - 4.0).abs() <= 0.011, "{said}");
     assert!((time_of(&said, "cut-in ends") - 5.0).abs() <= 0.021, "{said}");
     assert!(said.contains("`cut-in` ends at 5.00 s within its lane change"), "{said}");

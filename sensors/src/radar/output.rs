@@ -11,7 +11,7 @@ pub enum RadarSource {
     /// A vehicle, given by its index in the scenario's list of actors.
     Vehicle(usize),
     /// The mirror image of a vehicle behind a guard rail: a vehicle that does not exist. The index
-    /// is that of the mirrored vehicle.
+    /// names the mirrored vehicle.
     MirrorImage(usize),
     /// A fault of the sensor: a vehicle that does not exist.
     Fault,

@@ -57,7 +57,7 @@ fn worst_scenario<'a>(findings: &Findings<'a>) -> Option<&'a ScenarioOverview> {
     worst_first(findings.judged).first().and_then(|gate| named(&gate.scenario)).or(scenarios.first())
 }
 
-/// Returns the title of the evidence. The samples are those of all scenarios, the map is that of one.
+/// Returns the title of the evidence: samples of all scenarios, and the map of this one.
 fn evidence_title(scenarios: usize, mapped: Option<&str>) -> String {
     let samples = if scenarios > 1 { "Worst samples of all scenarios" } else { "Worst samples" };
     mapped.map_or(samples.to_owned(), |mapped| format!("{samples}, and the map of {mapped}"))
