@@ -13,7 +13,7 @@ const made = (name, attributes = {}, ...children) => {
   element.append(...children);
   return element;
 };
-let data, samples, arm, order, shown = [], current = null, panels = [], waiting = false, asked = 0;
+let data, samples, arm, order, shown = [], current = null, panels = [], asked = 0;
 
 // The samples of a scenario: typed arrays, made when the scenario is chosen.
 const load = index => {
@@ -195,6 +195,8 @@ const update = except => {
   }
   return Promise.all(drawn).then(() => performance.measure('update', { start, end: performance.now() }));
 };
+// The chart tells of a drawn brush up to a frame, or 50 ms, later. A brush that is cleared by then stays cleared.
+const clearBrush = panel => { panel.brush = []; panel.isDrawn = false; };
 const setBrush = (panel, range) => {
   panel.brush = [];
   const sorted = ([one, other]) => one < other ? [one, other] : [other, one];
@@ -277,7 +279,7 @@ const choose = () => {
     if (panel.id === 'map') { options(panel.x, names, first); options(panel.y, names, second); }
     else if (panel.y) { options(panel.x, names, liked('min_thw_front_s') ?? numeric[0]); options(panel.y, names, liked('min_thw_rear_s') ?? numeric[1]); }
     else options(panel.x, names, wanted[panel.index] ?? names[0][0]);
-    panel.brush = [];
+    clearBrush(panel);
   }
   for (const [name, of] of [['reason', 'mis_reason'], ['cause', 'cause']])
     options(form[name], [['', 'all'], ...(column(of)?.words ?? []).map((word, index) => [String(index), word])], '');
@@ -287,15 +289,19 @@ const choose = () => {
 };
 
 const watch = panel => {
-  const isBusy = () => waiting;
+  let isWaiting = false;
+  panel.chart.addEventListener('pointerdown', () => { panel.isDrawn = true; }, true);
   panel.chart.on('plotly_selecting', event => {
-    if (isBusy() || !event?.range) return;
-    waiting = true;
-    requestAnimationFrame(() => { setBrush(panel, event.range); update(panel).finally(() => { waiting = false; }); });
+    if (isWaiting || !event?.range) return;
+    isWaiting = true;
+    requestAnimationFrame(() => {
+      if (panel.isDrawn) setBrush(panel, event.range);
+      update(panel).finally(() => { isWaiting = false; });
+    });
   });
-  panel.chart.on('plotly_selected', event => { if (event?.range) { setBrush(panel, event.range); update(); } });
+  panel.chart.on('plotly_selected', event => { if (panel.isDrawn && event?.range) { setBrush(panel, event.range); panel.isDrawn = false; } update(); });
   panel.chart.on('plotly_click', event => { const row = event.points.find(point => point.customdata !== undefined)?.customdata; if (row !== undefined) show(row); });
-  panel.chart.on('plotly_doubleclick', () => { panel.brush = []; update(); });
+  panel.chart.on('plotly_doubleclick', () => { clearBrush(panel); update(); });
 };
 const start = async () => {
   const script = made('script', { textContent: await unpacked('plotly') });
@@ -314,8 +320,8 @@ const start = async () => {
   await update();
   panels.forEach(watch);
   for (const panel of panels) {
-    for (const select of [panel.x, panel.y]) select?.addEventListener('change', () => { panel.brush = []; update(); });
-    panel.clear.addEventListener('click', () => { panel.brush = []; update(); panel.x.focus(); });
+    for (const select of [panel.x, panel.y]) select?.addEventListener('change', () => { clearBrush(panel); update(); });
+    panel.clear.addEventListener('click', () => { clearBrush(panel); update(); panel.x.focus(); });
     for (const input of [panel.from, panel.to]) input?.addEventListener('change', () => {
       const [low, high] = ends(column(panel.x.value)), of = (one, end) => one.value === '' ? end : Number(one.value);
       setBrush(panel, panel.from.value === '' && panel.to.value === '' ? null : { x: [of(panel.from, low), of(panel.to, high)] });
@@ -326,7 +332,7 @@ const start = async () => {
   form.addEventListener('submit', event => { event.preventDefault(); number(); });
   form.addEventListener('change', event => { if (event.target.name === 'number') return; if (['scenario', 'arm'].includes(event.target.name)) choose(); update(); });
   byId('reset').addEventListener('click', () => { form.elements.reason.value = form.elements.cause.value = ''; choose(); update(); });
-  document.addEventListener('keydown', event => { if (event.key === 'Escape') { panels.forEach(panel => { panel.brush = []; }); update(); } });
+  document.addEventListener('keydown', event => { if (event.key === 'Escape') { panels.forEach(clearBrush); update(); } });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
     for (const input of document.querySelectorAll('#fates input')) input.nextElementSibling.style.setProperty('--key', fateColour(Number(input.value)));
     update();
