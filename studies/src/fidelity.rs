@@ -395,6 +395,7 @@ mod tests {
         let blind: Vec<[f64; 2]> = (0..100).map(|index| [number(index < 40), 0.0]).collect();
         let estimate = super::rate("x", &blind, &[0.0; 900]).unwrap();
         assert_eq!(estimate.correlation, None);
-        assert!((estimate.estimate.unwrap().worth_samples - 100.0).abs() < 1e-9);
+        let estimate = estimate.estimate.unwrap();
+        assert!((estimate.worth_samples - 100.0).abs() < 1e-9 && (estimate.standard_error_ratio - 1.0).abs() < 1e-9);
     }
 }
