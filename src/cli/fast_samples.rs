@@ -118,9 +118,9 @@ impl FidelityChoice {
                 )));
             }
         }
-        let samples = plan.sampling().samples;
-        let Some(samples) = samples.checked_mul(self.factor) else {
-            return Err(CliError::usage(format!("{option} {self}: {samples} samples, as many times, are too many")));
+        let (number, factor) = (plan.sampling().samples, self.factor);
+        let Some(samples) = number.checked_mul(factor) else {
+            return Err(CliError::usage(format!("{option} {self}: {factor} times {number} samples are too many")));
         };
         Ok(plan.with_sensors(self.mode, samples)?)
     }
