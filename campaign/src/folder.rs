@@ -14,6 +14,8 @@
 //!  recordings/        recordings (Rerun files) of selected samples, and a page that shows them
 //!  causes.json        what `explain` has found, if it was asked
 //!  explorer.html      the explorer as a file, if it was asked for
+//!  fidelity/          the folder of the same campaign with fast sensors, if it was asked for
+//!  fidelity.json      the rates that the fast samples have sharpened
 //! ```
 
 use std::fs;
@@ -50,9 +52,14 @@ pub const EXPLORER: &str = "explorer.html";
 pub const RECORDINGS: &str = "recordings";
 /// The page of the recordings, in their folder.
 pub const RECORDINGS_PAGE: &str = "index.html";
+/// The folder of the same campaign with fast sensors, in a campaign's folder. It has a manifest, a
+/// journal and wall times, and no reports.
+pub const FAST_SAMPLES: &str = "fidelity";
+/// The file with the rates that the fast samples have sharpened, in a campaign's folder.
+pub const FIDELITY_FILE: &str = "fidelity.json";
 
-/// All files of a campaign's folder, without its recordings.
-pub(crate) const FILES: [&str; 14] = [
+/// All files of a campaign's folder, without its recordings and its fast samples.
+pub(crate) const FILES: [&str; 15] = [
     MANIFEST,
     JOURNAL,
     AHEAD,
@@ -67,6 +74,7 @@ pub(crate) const FILES: [&str; 14] = [
     "summary.md",
     "causes.json",
     EXPLORER,
+    FIDELITY_FILE,
 ];
 
 /// The files that are made from the journal.

@@ -140,6 +140,24 @@ impl Plan {
         Ok(())
     }
 
+    /// Returns the plan of the same campaign with other sensors and another number of samples. Its
+    /// samples are not checked for validity.
+    ///
+    /// # Errors
+    /// As [`Self::use_sensors`].
+    pub fn with_sensors(&self, mode: SensorMode, samples: u64) -> Result<Self, ScenarioError> {
+        let sampling = Sampling { samples, ..self.sampling };
+        let mut plan = Self { sampling, checks: CheckPlan::off(), ..self.clone() };
+        plan.use_sensors(Some(mode))?;
+        Ok(plan)
+    }
+
+    /// Returns the name of the first scenario that may run with these sensors.
+    pub fn scenario_in(&self, mode: SensorMode) -> Option<&str> {
+        let file = self.scenarios.iter().find(|file| file.may_have_mode(mode, self.sensors))?;
+        Some(&file.config().name)
+    }
+
     /// Returns how the samples are drawn.
     pub const fn sampling(&self) -> Sampling {
         self.sampling

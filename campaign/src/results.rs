@@ -27,7 +27,7 @@ use std::time::Duration;
 use closecall_traffic::atomic::{WriteError, is_temporary};
 use serde_json::Value;
 
-use crate::folder::{FILES, Folder, LockedFolder, MANIFEST, RECORDINGS, RECORDINGS_PAGE, REPORT};
+use crate::folder::{FAST_SAMPLES, FILES, Folder, LockedFolder, MANIFEST, RECORDINGS, RECORDINGS_PAGE, REPORT};
 use crate::folder_error::FolderError;
 use crate::lock::Lock;
 use crate::manifest::Manifest;
@@ -215,10 +215,11 @@ fn remove(path: &Path) -> Result<bool, FolderError> {
 
 /// Removes a folder of results, whose lock is held.
 fn remove_results(path: &Path) -> Result<(), FolderError> {
-    let recordings = path.join(RECORDINGS);
-    if recordings.try_exists().map_err(|source| WriteError::new(&recordings, source))? {
-        remove_files(&recordings, |_| true)?;
-        fs::remove_dir(&recordings).map_err(|source| WriteError::new(&recordings, source))?;
+    for within in [RECORDINGS, FAST_SAMPLES].map(|name| path.join(name)) {
+        if within.try_exists().map_err(|source| WriteError::new(&within, source))? {
+            remove_files(&within, |_| true)?;
+            fs::remove_dir(&within).map_err(|source| WriteError::new(&within, source))?;
+        }
     }
     remove_files(path, |name| name != MANIFEST)?;
     remove_files(path, |_| true)?;
@@ -296,13 +297,18 @@ fn other_files(path: &Path, kept: &Kept) -> Result<Vec<String>, FolderError> {
     let is_recording = |name: &OsStr| {
         name == RECORDINGS_PAGE || is_temporary(name) || name.to_str().is_some_and(|name| kept.has_recording(name))
     };
+    let is_of_campaign = |name: &OsStr| is_temporary(name) || FILES.iter().any(|file| name == *file);
     let mut others = Vec::new();
     for name in names(path)? {
         let entry = path.join(&name);
-        if name == RECORDINGS && fs::symlink_metadata(&entry).is_ok_and(|entry| entry.is_dir()) {
-            let within = names(&entry)?.into_iter().filter(|name| !(is_recording(name) && is_file(&entry.join(name))));
-            others.extend(within.map(|name| format!("{RECORDINGS}/{}", name.display())));
-        } else if !(is_file(&entry) && (is_temporary(&name) || FILES.iter().any(|file| name == *file))) {
+        let is_folder = fs::symlink_metadata(&entry).is_ok_and(|entry| entry.is_dir());
+        let folder = [RECORDINGS, FAST_SAMPLES].into_iter().find(|folder| name == *folder).filter(|_| is_folder);
+        if let Some(folder) = folder {
+            let is_expected =
+                |name: &OsStr| if folder == RECORDINGS { is_recording(name) } else { is_of_campaign(name) };
+            let within = names(&entry)?.into_iter().filter(|name| !(is_expected(name) && is_file(&entry.join(name))));
+            others.extend(within.map(|name| format!("{folder}/{}", name.display())));
+        } else if !(is_file(&entry) && is_of_campaign(&name)) {
             others.push(name.display().to_string());
         }
     }

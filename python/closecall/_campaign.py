@@ -117,6 +117,7 @@ class CampaignOptions(TypedDict, total=False):
     max_errors: int | None
     retry_errors: bool
     failures_first: str | None
+    fidelity: str | None
     strict_artifacts: bool
     record: str | None
     no_gate: bool

@@ -84,6 +84,14 @@ def test_failures_of_an_earlier_campaign_run_first_on_ray_too(machines: Any, exp
     assert cluster.sha256(later / "journal.jsonl") == cluster.sha256(earlier / "journal.jsonl")
 
 
+def test_fast_samples_on_ray_have_the_bytes_of_one_machine(machines: Any, tmp_path: Path) -> None:
+    for name, more in [("here", []), ("ray", ["--ray", machines.address])]:
+        done = command("campaign", SCENARIO, *WORDS, "--fidelity", "ground-truth:2", "--out", tmp_path / name, *more)
+        assert done.returncode == 0, done.stdout + done.stderr
+    for file in ("journal.jsonl", "fidelity.json", "fidelity/journal.jsonl"):
+        assert len({cluster.sha256(tmp_path / name / file) for name in ("here", "ray")}) == 1, file
+
+
 def test_a_controller_in_python_is_shipped(machines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "shipped_controller.py"
     file.write_text(

@@ -11,11 +11,13 @@ use closecall_report::campaign::{
     CampaignReport, CountsText, CoverageText, FlakyText, Tally, VerdictText, ensemble_text,
 };
 use closecall_report::json;
+use serde_json::json;
 
 use super::CliError;
 use super::actions::command_for;
 use super::advice::{after_verdict, known_seed};
 use super::args::Format;
+use super::fast_samples::FastParts;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_text};
@@ -69,6 +71,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     }
     let works = works(&args.parts[0], parts.manifest())?;
     parts.check(&works)?;
+    let fast_parts = FastParts::open(&args.parts)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
     let merged = parts.merge(&works, &args.out, session::arguments(), args.resume)?;
@@ -83,6 +86,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
         ));
     }
     let saved = SavedCampaign::of(merged.folder.clone())?;
+    let rates = fast_parts.map(|fast| fast.merge(saved.folder(), args.resume, is_trusted)).transpose()?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let mut judged = tally.judgement();
     if let Some(remark) = known_seed(judged.has_gates(), saved.manifest(), false) {
@@ -91,9 +95,16 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let report =
         CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged, command_for };
     match args.format {
-        Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
+        Format::Json => {
+            let mut value = json::campaign_report(&report, None);
+            if let Some((fidelity, _)) = &rates {
+                value["fidelity"] = json!(fidelity);
+            }
+            outln!("{value:#}");
+        }
         Format::Human => {
             print_text(CountsText(&tally.summary));
+            rates.iter().for_each(|(_, text)| print_text(text));
             print_text(ensemble_text(&tally.summary, saved.manifest()));
             print_text(CoverageText(&judged));
             print_text(FlakyText(&tally.overview));

@@ -22,6 +22,7 @@ mod ensemble;
 mod error;
 mod explore;
 mod export;
+mod fast_samples;
 mod fidelity;
 mod file_sizes;
 mod gates;

@@ -160,7 +160,7 @@ impl PlanArgs {
     }
 
     /// Returns true if the outcomes or the clock determine the number of samples.
-    const fn is_sequential(&self) -> bool {
+    pub(super) const fn is_sequential(&self) -> bool {
         self.until_certain || self.time_budget.is_some()
     }
 

@@ -171,12 +171,8 @@ impl Results {
                 }
             }
         };
-        // Only a folder whose commands run in this working folder is remembered as the user's own.
-        let is_here = |there: &Manifest| there.working_folder == manifest.working_folder;
-        if let Some(locked) =
-            locked.as_ref().filter(|locked| locked.folder.manifest().is_ok_and(|there| is_here(&there)))
-        {
-            remember(&locked.folder);
+        if let Some(locked) = &locked {
+            remember_here(&locked.folder, manifest);
         }
         Ok(Self { locked, lost })
     }
@@ -196,6 +192,14 @@ impl Results {
     /// Returns the reason for which the results are not kept completely, if they should be.
     pub(super) fn into_lost(self) -> Option<CliError> {
         self.lost
+    }
+}
+
+/// Remembers that the folder of a running campaign is the user's own. Only a folder whose commands run
+/// in this working folder is.
+pub(super) fn remember_here(folder: &Folder, manifest: &Manifest) {
+    if folder.manifest().is_ok_and(|there| there.working_folder == manifest.working_folder) {
+        remember(folder);
     }
 }
 

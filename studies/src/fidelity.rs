@@ -17,18 +17,26 @@
 //! agree. If they do not agree at all, β is about 0 and the estimate is that of the full chain. (Control variates: Lemieux, *Monte
 //! Carlo and Quasi-Monte Carlo Sampling*, 2009, section 4.1; with a mean that is estimated itself: Schmeiser, Taaffe and Wang,
 //! *Biased control-variate estimation*, 2001.)
+//!
+//! The fast campaign is one of its own, or lies in the folder of the first one ([`FAST_SAMPLES`]): then
+//! the folder also has the [`Fidelity`] of both.
+//!
+//! [`FAST_SAMPLES`]: closecall_campaign::folder::FAST_SAMPLES
 
 use std::collections::BTreeMap;
 
-use closecall_campaign::folder::{FolderError, listed};
+use closecall_campaign::folder::{FIDELITY_FILE, Folder, FolderError, listed};
 use closecall_campaign::ledger::{Inference, PairFate};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::Record;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input;
 use closecall_traffic::statistics::interval::clopper_pearson;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Coverage of the intervals.
@@ -38,7 +46,7 @@ const COVERAGE: f64 = 0.95;
 const FEWEST_EVENTS: u64 = 10;
 
 /// A rate of the full chain, from its own runs and with the fast ones.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FidelityRate {
     /// What is counted: `ego_collided` of an arm, `prevented`, `induced`.
     pub of: String,
@@ -57,7 +65,7 @@ pub struct FidelityRate {
 }
 
 /// A rate with its interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FidelityEstimate {
     /// The rate.
     pub value: f64,
@@ -65,10 +73,12 @@ pub struct FidelityEstimate {
     pub interval_95: [f64; 2],
     /// The number of runs of the full chain alone that would have the same variance.
     pub worth_samples: f64,
+    /// The standard error, relative to the one of the runs of the full chain alone.
+    pub standard_error_ratio: f64,
 }
 
 /// The rates of one scenario.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FidelityReport {
     /// The scenario.
     pub scenario: String,
@@ -80,6 +90,81 @@ pub struct FidelityReport {
     pub left_out: u64,
     /// The rates.
     pub rates: Vec<FidelityRate>,
+}
+
+/// The rates of a campaign that has run more of its samples with fast sensors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fidelity {
+    /// The sensors of the fast samples.
+    pub mode: String,
+    /// Number of fast samples, relative to the samples of the campaign.
+    pub factor: u64,
+    /// Number of samples of each scenario of the campaign.
+    pub samples: u64,
+    /// The rates of each scenario.
+    pub scenarios: Vec<FidelityReport>,
+}
+
+impl Fidelity {
+    /// Returns the rates of a campaign, `full`, and of its fast samples.
+    ///
+    /// # Errors
+    /// As [`fidelity`].
+    pub fn of(full: &SavedCampaign, fast: &SavedCampaign) -> Result<Self, FidelityError> {
+        let scenarios = fidelity(full, fast)?;
+        let (samples, fast_samples) = (full.manifest().sampling.samples, fast.manifest().sampling.samples);
+        Ok(Self {
+            mode: fast.manifest().sensors.map_or("as in the scenario", SensorMode::name).to_owned(),
+            factor: fast_samples / samples.max(1),
+            samples,
+            scenarios,
+        })
+    }
+
+    /// Reads the rates from the folder of a campaign. Returns `None` if it has none, or if the
+    /// campaign has other samples by now.
+    pub fn read(folder: &Folder) -> Option<Self> {
+        let text = input::read_text(&folder.file(FIDELITY_FILE)).ok()?;
+        let fidelity: Self = serde_json::from_str(&text).ok()?;
+        let samples = folder.manifest().ok()?.sampling.samples;
+        (fidelity.samples == samples).then_some(fidelity)
+    }
+
+    /// Writes the rates into the folder of the campaign.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written.
+    pub fn write(&self, folder: &Folder) -> Result<(), WriteError> {
+        write_file(&folder.file(FIDELITY_FILE), |file| {
+            serde_json::to_writer_pretty(&mut *file, self)?;
+            file.write_all(b"\n")
+        })
+    }
+}
+
+/// Returns the mean wall time of a fast sample of each scenario, relative to a sample of the full
+/// chain. A scenario without wall times has none.
+///
+/// # Errors
+/// [`FolderError`] if a folder has no wall times.
+pub fn time_ratios(full: &Folder, fast: &Folder) -> Result<BTreeMap<String, f64>, FolderError> {
+    let (full_s, fast_s) = (mean_times_s(full)?, mean_times_s(fast)?);
+    let ratio = |(scenario, fast_s): (String, f64)| {
+        let full_s = *full_s.get(&scenario)?;
+        (full_s > 0.0).then(|| (scenario, fast_s / full_s))
+    };
+    Ok(fast_s.into_iter().filter_map(ratio).collect())
+}
+
+/// Returns the mean wall time of a sample of each scenario in all arms (s).
+fn mean_times_s(folder: &Folder) -> Result<BTreeMap<String, f64>, FolderError> {
+    let mut sums: BTreeMap<String, (f64, u64)> = BTreeMap::new();
+    for time in folder.wall_times()? {
+        let (sum_s, samples) = sums.entry(time.scenario).or_default();
+        *sum_s += time.wall_s.iter().sum::<f64>();
+        *samples += 1;
+    }
+    Ok(sums.into_iter().map(|(scenario, (sum_s, samples))| (scenario, sum_s / samples as f64)).collect())
 }
 
 /// Why two campaigns are not two fidelities of the same samples.
@@ -256,6 +341,7 @@ fn rate(name: &str, pairs: &[[f64; 2]], more: &[f64]) -> Option<FidelityRate> {
             value: value.clamp(0.0, 1.0),
             interval_95: [value - half, value + half].map(|end| end.clamp(0.0, 1.0)),
             worth_samples: of_full / variance,
+            standard_error_ratio: (variance * n / of_full).sqrt(),
         }),
     })
 }
@@ -309,6 +395,7 @@ mod tests {
         let blind: Vec<[f64; 2]> = (0..100).map(|index| [number(index < 40), 0.0]).collect();
         let estimate = super::rate("x", &blind, &[0.0; 900]).unwrap();
         assert_eq!(estimate.correlation, None);
-        assert!((estimate.estimate.unwrap().worth_samples - 100.0).abs() < 1e-9);
+        let estimate = estimate.estimate.unwrap();
+        assert!((estimate.worth_samples - 100.0).abs() < 1e-9 && (estimate.standard_error_ratio - 1.0).abs() < 1e-9);
     }
 }

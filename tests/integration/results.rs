@@ -272,6 +272,24 @@ fn a_file_that_somebody_has_put_among_the_results_is_not_lost() {
 }
 
 #[test]
+fn results_with_fast_samples_become_the_previous_ones_and_are_removed() {
+    let folder = folder();
+    let [results, previous] = [RESULTS, PREVIOUS].map(|name| folder.path().join(name));
+    let fast = ["--fidelity", "ground-truth:2", "--sensors", "object"];
+    let with_fast_samples = [&["campaign", "low-thw-overtake", "-n", "4", "--no-gate"][..], &fast].concat();
+    stdout(&run(folder.path(), &with_fast_samples), 0);
+    assert!(results.join("fidelity/journal.jsonl").is_file() && results.join("fidelity.json").is_file());
+    stdout(&campaign(folder.path(), &[]), 0);
+    assert!(!results.join("fidelity").exists() && previous.join("fidelity/manifest.json").is_file());
+    stdout(&campaign(folder.path(), &[]), 0);
+    assert!(!previous.join("fidelity").exists() && !previous.join("fidelity.json").exists());
+    // A file of the user among the fast samples stays.
+    stdout(&run(folder.path(), &with_fast_samples), 0);
+    fs::write(results.join("fidelity/notes.txt"), "do not lose this").unwrap();
+    assert_refused(folder.path(), "beside the results of a campaign it holds fidelity/notes.txt");
+}
+
+#[test]
 fn an_input_among_the_results_is_not_overwritten() {
     let folder = folder();
     stdout(&campaign(folder.path(), &[]), 0);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::coverage::line;
 use super::ensemble::ensemble_markdown;
+use super::fidelity::{fidelity_markdown, of_findings};
 use super::findings::Findings;
 use super::origins::Origins;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
@@ -50,6 +51,9 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));
+    if let Some(fidelity) = of_findings(findings) {
+        text.push_str(&fidelity_markdown(&fidelity, cell));
+    }
     text.push_str(&ensemble_markdown(findings.summary, findings.manifest));
     text.push_str(&requirements(findings));
     for (scenario, results) in &findings.judged.coverage {

@@ -238,6 +238,19 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
 }
 
 #[test]
+fn the_keys_of_two_fidelities_are_those_documented() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    // With 60 samples one rate has an interval, and no sample is induced.
+    let words = ["campaign", "low-thw-overtake", "-n", "60", "--seed", "1", "--paired", "--no-gate"];
+    let fast = ["--sensors", "object", "--fidelity", "ground-truth:3", "--record", "failures:0", "--out"];
+    let report = program(&[&words[..], &fast, &[out.to_str().unwrap()]].concat(), 0);
+    let file = json_file(&out.join("fidelity.json"));
+    hold("fidelity", [&file]);
+    assert_eq!(report["fidelity"], file);
+}
+
+#[test]
 fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

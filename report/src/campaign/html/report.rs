@@ -9,6 +9,7 @@ use super::page::document;
 use super::{ledger, provenance, samples, scenario, verdict};
 use crate::campaign::causes;
 use crate::campaign::ensemble::ensemble_html;
+use crate::campaign::fidelity;
 use crate::campaign::findings::Findings;
 use crate::campaign::origins;
 use closecall_traffic::atomic::{WriteError, write_file};
@@ -30,6 +31,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
         (origins::section(findings))
         (verdict::gates(findings))
         (ledger::collisions(findings)?)
+        (fidelity::section(findings))
         (scenario::evidence(findings)?)
         (ensemble_html(findings.summary, findings.manifest))
         (verdict::requirements(findings))
