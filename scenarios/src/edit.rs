@@ -23,6 +23,9 @@ pub struct Setting {
 /// Tables at the top level that a file may leave out and a setting may create.
 const OPTIONAL_TABLES: [&str; 2] = ["ideal", "fault"];
 
+/// Keys of a parameter that leave its distribution as it is.
+const REMARKS: [&str; 5] = ["fitted", "assumed", "observed", "spearman", "note"];
+
 /// A setting that cannot be applied.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
@@ -88,18 +91,40 @@ impl Setting {
 
     /// Returns true if nothing is left of an `earlier` setting after this one: it has the same key
     /// and another value, it replaces the table in which the earlier key is, or it gives a parameter
-    /// a distribution that the earlier one fixed. A part of a table that an earlier setting gave,
-    /// and a value of a parameter whose distribution it gave, are no contradiction.
+    /// that the earlier one fixed a distribution or another value. A part of a table that an earlier
+    /// setting gave, and a value of a parameter whose distribution it gave, are no contradiction.
     pub fn undoes(&self, earlier: &Self) -> bool {
         if self.key == earlier.key {
-            return self.value != earlier.value;
+            return !is_equal(&self.value(), &earlier.value());
+        }
+        if let (Some((name, value)), Some((fixed, fixed_value))) = (self.fixed(), earlier.fixed())
+            && name == fixed
+        {
+            return !is_equal(&value, &fixed_value);
         }
         let replaces_table = earlier.key.starts_with(&self.key);
-        let is_of_same_parameter = match (&earlier.key[..], &self.key[..]) {
-            ([fixed], [table, name, ..]) => table == "parameters" && name == fixed,
+        let gives_distribution = match (&earlier.key[..], &self.key[..]) {
+            ([fixed], [table, name, rest @ ..]) => {
+                let is_remark = rest.first().is_some_and(|key| REMARKS.contains(&key.as_str()));
+                table == "parameters" && name == fixed && !is_remark
+            }
             _ => false,
         };
-        replaces_table || is_of_same_parameter
+        replaces_table || gives_distribution
+    }
+
+    /// Returns the parameter that the setting fixes, and its value, whichever way it is written. A
+    /// key without a dot may also be a key of the file.
+    fn fixed(&self) -> Option<(&str, Value)> {
+        match &self.key[..] {
+            [name] => Some((name.as_str(), self.value())),
+            [table, name] if table == "parameters" => {
+                let value = self.value().as_inline_table()?.get("fixed")?.clone();
+                Some((name.as_str(), value))
+            }
+            [table, name, key] if table == "parameters" && key == "fixed" => Some((name.as_str(), self.value())),
+            _ => None,
+        }
     }
 
     /// Sets the value in `document`.
@@ -184,6 +209,15 @@ impl Setting {
     }
 }
 
+/// Returns true if both values mean the same: numbers are compared as numbers (`6` and `6.0`).
+fn is_equal(one: &Value, other: &Value) -> bool {
+    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
+    match (number(one), number(other)) {
+        (Some(one), Some(other)) => one == other,
+        _ => one.to_string().trim() == other.to_string().trim(),
+    }
+}
+
 fn keys(table: &dyn TableLike) -> String {
     table.iter().map(|(key, _)| format!("`{key}`")).collect::<Vec<_>>().join(", ")
 }
@@ -229,6 +263,8 @@ mod tests {
             ["actor.rear.start.behind.gap-m=90", "actor.rear . start.behind.gap-m = 120"],
             ["actor.rear.start.behind.gap-m=90", "actor.rear.start={behind={gap-m=120}}"],
             ["brake-mps2=6", "parameters.brake-mps2.uniform.min=5"],
+            ["parameters.brake-mps2={fixed=5}", "brake-mps2=6"],
+            ["brake-mps2=6", "parameters.brake-mps2.fixed=5"],
             ["acc:aeb.trigger-mps2=5", "acc:aeb.trigger-mps2=6"],
         ] {
             let [first, second] = found(&texts).unwrap_or_else(|| panic!("{texts:?}"));
@@ -237,6 +273,9 @@ mod tests {
         }
         for texts in [
             ["brake-mps2=6", "brake-mps2=6"],
+            ["brake-mps2=6", "brake-mps2=6.0"],
+            ["brake-mps2=6", "parameters.brake-mps2.fixed=6"],
+            ["brake-mps2=6", "parameters.brake-mps2.assumed=a guess"],
             ["brake-mps2=6", "brake=4"],
             ["parameters.brake-mps2.uniform.min=5", "parameters.brake-mps2.uniform.max=7"],
             ["parameters.brake-mps2={uniform={min=4,max=8}}", "brake-mps2=6"],

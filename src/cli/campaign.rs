@@ -237,13 +237,13 @@ impl CampaignArgs {
             (true, _) => {}
             (false, Some(_)) => {
                 return Err(CliError::usage(format!(
-                    "{} secret: the campaign in {folder} began with the seed {seed}, which was named: resume it with {} {seed}, or draw a seed for another folder",
+                    "{} secret: the campaign in {folder} began with the seed {seed}, which was known beforehand: resume it with {} {seed}, or draw a seed for another folder",
                     Argument("judge-seed"),
                     Argument("seed")
                 )));
             }
             (false, None) => print_error(format_args!(
-                "{folder}: its campaign began with the seed {seed}, which was named, and goes on with it\n"
+                "{folder}: its campaign began with the seed {seed}, which was known beforehand, and goes on with it\n"
             )),
         }
         Ok(CampaignSeed { seed, is_drawn })

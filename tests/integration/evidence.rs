@@ -397,7 +397,7 @@ fn a_named_seed_does_not_become_a_secret_one_by_resumption() {
     let refused = run(&["--judge-seed", "secret", "--no-gate", "--resume"]);
     let said = message(&refused);
     assert_eq!(code(&refused), 2, "{said}");
-    assert!(said.contains("began with the seed 5, which was named") && said.contains("--seed 5"), "{said}");
+    assert!(said.contains("began with the seed 5, which was known beforehand") && said.contains("--seed 5"), "{said}");
     is_named();
     let resumed = stdout(&run(&["--seed", "5", "--no-gate", "--resume"]), 0);
     assert!(!resumed.contains("drawn for this campaign"), "{resumed}");
@@ -416,7 +416,7 @@ fn a_preset_that_draws_goes_on_with_a_seed_that_was_named() {
     assert!(out.join("manifest.json").is_file(), "{}", stderr(&first));
     let resumed = run(&["--resume"]);
     assert_eq!(code(&resumed), code(&first), "{}", stderr(&resumed));
-    assert!(message(&resumed).contains("began with the seed 5, which was named"), "{}", message(&resumed));
+    assert!(message(&resumed).contains("began with the seed 5, which was known beforehand"), "{}", message(&resumed));
     assert!(!String::from_utf8_lossy(&resumed.stdout).contains("drawn for this campaign"));
     let manifest = std::fs::read_to_string(out.join("manifest.json")).unwrap();
     assert!(manifest.contains("\"has_drawn_seed\": false"), "{manifest}");

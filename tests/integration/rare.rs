@@ -243,7 +243,7 @@ fn a_named_seed_of_weighted_runs_does_not_become_a_secret_one_by_resumption() {
     stdout(&rare(&words("--seed 5")), 0);
     let refused = rare(&words("--judge-seed secret --resume"));
     assert_eq!(code(&refused), 2, "{}", stderr(&refused));
-    assert!(message(&refused).contains("began with the seed 5, which was named"), "{}", message(&refused));
+    assert!(message(&refused).contains("began with the seed 5, which was known beforehand"), "{}", message(&refused));
     let manifest = fs::read_to_string(out.join("rare-manifest.json")).unwrap();
     assert!(manifest.contains("\"has_drawn_seed\": false"), "{manifest}");
 }
