@@ -54,6 +54,7 @@
 //! | - | road frame `s_m`, `d_m` | - | Position along the road, and across it to the left. |
 
 mod absent;
+mod acceleration_lane;
 mod actor;
 pub mod atomic;
 pub mod bodies;
@@ -89,6 +90,7 @@ pub mod suggest;
 pub mod words;
 
 pub use absent::{Absent, Measured};
+pub use acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 pub use actor::{ActorId, InvalidActorId};
 pub use body_shape::BodyShape;
 pub use check::{Check, ConfigError, KeyPath, Problem, Range, Segment};
