@@ -1,11 +1,13 @@
 //! Concrete scenarios: every value is a number, and every number has been checked.
 
 use closecall_controllers::external::VariableTable;
-use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
+use closecall_controllers::{
+    CheckedDriver, DriverConfig, ENTRY_STOP_MPS2, HumanDriver, LaneKeeping, SpeedKeeping, entry_stop_distance_m,
+};
 use closecall_sensors::Sensors;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Environment, LateralPath, Num, PHYSICS_STEP, Parameters, Problem, Range, Road, Time,
-    Vehicle, VehicleState,
+    ActorId, Check, ConfigError, Environment, GRAVITY_MPS2, LateralPath, Num, PHYSICS_STEP, Parameters, Problem, Range,
+    Road, Time, Vehicle, VehicleState,
 };
 
 use crate::coverage::CoveragePlan;
@@ -238,6 +240,8 @@ impl ScenarioConfig {
         for (((index, actor), driver), path) in self.actors.iter().enumerate().zip(drivers).zip(paths) {
             check_path_grip(path.as_ref(), states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
+            let entering = Entering { driver: &driver, vehicle: &vehicles[index], start: &states[index] };
+            entering.check(road, friction).map_err(|error| at(index, error))?;
             let Keeping { lane_keeping, speed_keeping } =
                 actor.check_keeping(parameters).map_err(|error| at(index, error))?;
             check_weaving(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
@@ -248,7 +252,7 @@ impl ScenarioConfig {
                 let lane = road.lane_at(states[index].d_m);
                 event
                     .then
-                    .check_lane_change((&actor.driver, lane), road.lanes())
+                    .check_lane_change((&actor.driver, lane), road)
                     .map_err(|error| locate(error.within("then")))?;
                 events.push(event);
             }
@@ -369,9 +373,61 @@ fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) ->
 fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
     match driver {
         CheckedDriver::Human(HumanDriver::Prescribed(prescribed)) => prescribed
-            .check_lanes(road.lane_at(start.d_m), road.lanes())
+            .check_lanes(road.lane_at(start.d_m), road)
             .map_err(|error| error.within("prescribed").within("driver")),
         _ => Ok(()),
+    }
+}
+
+/// Least share of the friction that the brakes of a vehicle can use (-): the share of a truck.
+const LEAST_BRAKE_SHARE: f64 = 0.75;
+
+/// An actor that may start in the acceleration lane.
+struct Entering<'a> {
+    driver: &'a CheckedDriver,
+    vehicle: &'a Vehicle,
+    start: &'a VehicleState,
+}
+
+impl Entering<'_> {
+    /// Checks that the actor can leave the acceleration lane, and can stop before its end, if it
+    /// starts in that lane.
+    fn check(&self, road: &Road, friction: f64) -> Result<(), ConfigError> {
+        let Some(lane) = road.acceleration_lane() else { return Ok(()) };
+        let number = road.lane_at(self.start.d_m);
+        if road.entry_lane() != Some(number) {
+            return Ok(());
+        }
+        let refuse = |key, other, rule| Err(ConfigError::new(key, Problem::Contradiction { other, rule }));
+        let can_merge = match self.driver {
+            CheckedDriver::Human(human) => human.can_merge(),
+            CheckedDriver::Ego(_) => false,
+        };
+        if !can_merge {
+            let rule = format!(
+                "lane {number} is the acceleration lane, and only `wiedemann99` and `idm` leave it before it ends"
+            );
+            return refuse("driver", "start", rule);
+        }
+        let braking_mps2 = LEAST_BRAKE_SHARE * friction * GRAVITY_MPS2;
+        if !(braking_mps2 >= ENTRY_STOP_MPS2) {
+            let rule = format!(
+                "a truck can brake by {braking_mps2:.1} m/s² on this road, and a driver in the acceleration lane needs \
+                 {ENTRY_STOP_MPS2} m/s² to stop before its end"
+            );
+            return refuse("start", "environment.friction", rule);
+        }
+        let rest_m = (lane.to_m - self.start.s_m) * (1.0 - road.curvature_per_m() * self.start.d_m)
+            - 0.5 * self.vehicle.dimensions.length_m;
+        let needed_m = entry_stop_distance_m(self.start.speed_mps);
+        if !(rest_m >= needed_m) {
+            let rule = format!(
+                "the acceleration lane ends {rest_m:.1} m ahead, and at {:.1} m/s the driver needs {needed_m:.1} m to stop",
+                self.start.speed_mps
+            );
+            return refuse("start", "road.acceleration-lane", rule);
+        }
+        Ok(())
     }
 }
 
@@ -386,5 +442,69 @@ fn only_ego(actors: &[Actor]) -> Result<usize, ConfigError> {
             let problem = Problem::Duplicate { value: format!("ego-stack of {}", actor.id) };
             Err(ConfigError::new("driver", problem).within_index(second).within("actor"))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::sampling::Design;
+    use crate::{Scenario, ScenarioFile};
+
+    const RAMP: &str = "acceleration-lane = { from-m = 600.0, length-m = 250.0, taper-m = 60.0 }";
+
+    /// The ego at 30 m/s in this lane, and a vehicle on a road of three lanes, the rightmost of which
+    /// is an acceleration lane.
+    fn scenario(ego_lane: u8, start: &str, driver: &str, more: &str) -> Result<Scenario, String> {
+        let text = format!(
+            "schema-version = 1\nname = 'ramp'\nduration-s = 5.0\nroad = {{ lanes = 3, {RAMP} }}\n{more}\n\
+             [[actor]]\nid = 'ego'\nvehicle = {{ class = 'car' }}\n\
+             start = {{ absolute = {{ lane = {ego_lane}, s-m = 500.0, speed-mps = 30.0 }} }}\n\
+             driver = {{ ego-stack = {{ acc = {{ time-gap-s = 0.7 }} }} }}\n\
+             [[actor]]\nid = 'ramp'\nvehicle = {{ class = 'car' }}\nstart = {{ absolute = {{ {start} }} }}\n\
+             driver = {{ {driver} }}\n"
+        );
+        let file = ScenarioFile::parse(Path::new("ramp.toml"), &text, &[]).map_err(|error| error.to_string())?;
+        let sample = file.space().sample(Design::Random, 0, 0, 1);
+        file.concrete(&sample).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_vehicle_in_the_acceleration_lane_needs_a_driver_that_leaves_it_and_room_to_stop() {
+        let (on_ramp, follows) = ("lane = 3, s-m = 560.0, speed-mps = 25.0", "wiedemann99 = {}");
+        assert!(scenario(2, on_ramp, follows, "").is_ok());
+        assert!(scenario(2, on_ramp, "idm = {}", "").is_ok());
+        let refused = |ego_lane, start, driver, more| scenario(ego_lane, start, driver, more).unwrap_err();
+        let error = refused(2, on_ramp, "prescribed = { profile = [[0.0, 25.0]] }", "");
+        assert!(error.contains("only `wiedemann99` and `idm` leave it"), "{error}");
+        let error = refused(3, "lane = 1, s-m = 560.0, speed-mps = 25.0", follows, "");
+        assert!(error.contains("only `wiedemann99` and `idm` leave it"), "{error}");
+        let error = refused(2, "lane = 3, s-m = 780.0, speed-mps = 25.0", follows, "");
+        assert!(error.contains("to stop"), "{error}");
+        let error = refused(2, on_ramp, follows, "environment = { friction = 0.3 }");
+        assert!(error.contains("environment.friction"), "{error}");
+        // Beside the acceleration lane, all of this is allowed.
+        let beside = "lane = 2, s-m = 780.0, speed-mps = 25.0";
+        assert!(
+            scenario(1, beside, "prescribed = { profile = [[0.0, 25.0]] }", "environment = { friction = 0.3 }").is_ok()
+        );
+    }
+
+    #[test]
+    fn nobody_enters_the_acceleration_lane_from_the_road() {
+        let start = "lane = 2, s-m = 560.0, speed-mps = 25.0";
+        let change = |to| {
+            format!(
+                "prescribed = {{ profile = [[0.0, 25.0]], lane-changes = [{{ at-s = 1, to = '{to}', duration-s = 4 }}] }}"
+            )
+        };
+        assert!(scenario(1, start, &change("left"), "").is_ok());
+        let error = scenario(1, start, &change("right"), "").unwrap_err();
+        assert!(error.contains("vehicles leave and do not enter"), "{error}");
+        let traffic = "[[traffic]]\nid = 'others'\ndraw = 0.5\nlanes = [3]\nvehicles = 2\nfrom-m = 150.0\n\
+                       mean-thw-s = 2.5\nspeed-mps = 25.0\ndriver = { idm = {} }";
+        let error = scenario(1, start, "idm = {}", traffic).unwrap_err();
+        assert!(error.contains("traffic[0].lanes[0]") && error.contains("through lanes"), "{error}");
     }
 }

@@ -54,6 +54,25 @@ impl fmt::Display for Lane {
     }
 }
 
+/// Why a vehicle cannot change to the lane beside its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoLaneBeside {
+    /// The road ends there.
+    #[error("lane {lane} of {lanes} has no lane on that side, counted from 1 at the left")]
+    OffRoad {
+        /// The lane of the vehicle.
+        lane: Lane,
+        /// The number of lanes.
+        lanes: u8,
+    },
+    /// The lane is the acceleration lane.
+    #[error("lane {lane} is the acceleration lane, which vehicles leave and do not enter")]
+    Entry {
+        /// The acceleration lane.
+        lane: Lane,
+    },
+}
+
 /// A pose in the Cartesian plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanePose {
@@ -332,6 +351,18 @@ impl Road {
         match side {
             Side::Left => (lane.0 > 1).then(|| Lane(lane.0 - 1)),
             Side::Right => (lane.0 < self.lanes).then(|| Lane(lane.0 + 1)),
+        }
+    }
+
+    /// Returns the lane to which a vehicle in `lane` changes on one side.
+    ///
+    /// # Errors
+    /// [`NoLaneBeside`] if the road has no lane there, or only its acceleration lane.
+    pub fn lane_to_enter(&self, lane: Lane, side: Side) -> Result<Lane, NoLaneBeside> {
+        match self.beside(lane, side) {
+            None => Err(NoLaneBeside::OffRoad { lane, lanes: self.lanes }),
+            Some(target) if self.entry_lane() == Some(target) => Err(NoLaneBeside::Entry { lane: target }),
+            Some(target) => Ok(target),
         }
     }
 
