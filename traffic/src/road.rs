@@ -308,17 +308,25 @@ impl Road {
         })
     }
 
+    /// Returns the lateral position of a boundary of the lanes at `s_m` (m). Boundary 0 is the left
+    /// edge of lane 1, and boundary n is the right edge of lane n. The outer boundary of the
+    /// acceleration lane moves inwards where the lane narrows.
+    pub fn boundary_at_m(&self, number: u8, s_m: f64) -> f64 {
+        let full_m = -f64::from(number) * self.lane_width_m;
+        let Some(lane) = self.acceleration_lane else { return full_m };
+        let missing_m = || (1.0 - lane.width_share(s_m)) * self.lane_width_m;
+        match self.overtaking_side {
+            Side::Left if number == self.lanes => full_m + missing_m(),
+            Side::Right if number == 0 => full_m - missing_m(),
+            Side::Left | Side::Right => full_m,
+        }
+    }
+
     /// Returns the lateral positions of the left and of the right edge of the lanes at `s_m` (m).
     /// They differ from 0 and from [`right_edge_m`](Self::right_edge_m) where the acceleration lane
     /// narrows and beyond its end.
     pub fn edges_at_m(&self, s_m: f64) -> [f64; 2] {
-        let right_edge_m = self.right_edge_m();
-        let Some(lane) = self.acceleration_lane else { return [0.0, right_edge_m] };
-        let missing_m = (1.0 - lane.width_share(s_m)) * self.lane_width_m;
-        match self.overtaking_side {
-            Side::Left => [0.0, right_edge_m + missing_m],
-            Side::Right => [-missing_m, right_edge_m],
-        }
+        [0, self.lanes].map(|number| self.boundary_at_m(number, s_m))
     }
 
     /// Returns the same road with guard rails on both sides.
