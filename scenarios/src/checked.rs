@@ -78,7 +78,8 @@ impl Check for ScenarioConfig {
         let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
         let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
         let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
-        let mut actors = self.check_actors(&road, environment.friction, parameters)?;
+        let duration = Time::from_s(duration_s);
+        let mut actors = self.check_actors(&road, (environment.friction, duration), parameters)?;
         let ego = only_ego(&actors)?;
         for (index, traffic) in self.traffic.iter().enumerate() {
             traffic::add(traffic, &mut actors, ego, &road, parameters)
@@ -92,7 +93,7 @@ impl Check for ScenarioConfig {
         sensors.check_mounting().map_err(|error| error.within("sensors"))?;
         Ok(Scenario {
             name: self.name.clone(),
-            duration: Time::from_s(duration_s),
+            duration,
             road,
             environment,
             ego,
@@ -217,7 +218,12 @@ impl ScenarioConfig {
         Ok(())
     }
 
-    fn check_actors(&self, road: &Road, friction: f64, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
+    fn check_actors(
+        &self,
+        road: &Road,
+        (friction, duration): (f64, Time),
+        parameters: &Parameters,
+    ) -> Result<Vec<Actor>, ConfigError> {
         let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
         let mut vehicles = Vec::with_capacity(self.actors.len());
         let mut fleets = Vec::with_capacity(self.actors.len());
@@ -241,7 +247,7 @@ impl ScenarioConfig {
             check_path_grip(path.as_ref(), states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
             let entering = Entering { driver: &driver, vehicle: &vehicles[index], start: &states[index] };
-            entering.check(road, friction).map_err(|error| at(index, error))?;
+            entering.check(road, friction, duration).map_err(|error| at(index, error))?;
             let Keeping { lane_keeping, speed_keeping } =
                 actor.check_keeping(parameters).map_err(|error| at(index, error))?;
             check_weaving(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
@@ -390,42 +396,53 @@ struct Entering<'a> {
 }
 
 impl Entering<'_> {
-    /// Checks that the actor can leave the acceleration lane, and can stop before its end, if it
+    /// Checks that the actor leaves the acceleration lane before its end, or can stop there, if it
     /// starts in that lane.
-    fn check(&self, road: &Road, friction: f64) -> Result<(), ConfigError> {
+    fn check(&self, road: &Road, friction: f64, duration: Time) -> Result<(), ConfigError> {
         let Some(lane) = road.acceleration_lane() else { return Ok(()) };
         let number = road.lane_at(self.start.d_m);
         if road.entry_lane() != Some(number) {
             return Ok(());
         }
-        let refuse = |key, other, rule| Err(ConfigError::new(key, Problem::Contradiction { other, rule }));
-        let can_merge = match self.driver {
-            CheckedDriver::Human(human) => human.can_merge(),
-            CheckedDriver::Ego(_) => false,
-        };
-        if !can_merge {
-            let rule = format!(
-                "lane {number} is the acceleration lane, and only `wiedemann99` and `idm` leave it before it ends"
-            );
-            return refuse("driver", "start", rule);
-        }
-        let braking_mps2 = LEAST_BRAKE_SHARE * friction * GRAVITY_MPS2;
-        if !(braking_mps2 >= ENTRY_STOP_MPS2) {
-            let rule = format!(
-                "a truck can brake by {braking_mps2:.1} m/s² on this road, and a driver in the acceleration lane needs \
-                 {ENTRY_STOP_MPS2} m/s² to stop before its end"
-            );
-            return refuse("start", "environment.friction", rule);
-        }
         let rest_m = (lane.to_m - self.start.s_m) * (1.0 - road.curvature_per_m() * self.start.d_m)
             - 0.5 * self.vehicle.dimensions.length_m;
-        let needed_m = entry_stop_distance_m(self.start.speed_mps);
-        if !(rest_m >= needed_m) {
-            let rule = format!(
-                "the acceleration lane ends {rest_m:.1} m ahead, and at {:.1} m/s the driver needs {needed_m:.1} m to stop",
-                self.start.speed_mps
-            );
-            return refuse("start", "road.acceleration-lane", rule);
+        let refuse = |key, other, rule| Err(ConfigError::new(key, Problem::Contradiction { other, rule }));
+        match self.driver {
+            CheckedDriver::Human(HumanDriver::Prescribed(driver)) => {
+                let leaves = driver.first_lane_change().filter(|leaves| *leaves < duration).unwrap_or(duration);
+                let driven_m = driver.distance_m(self.start.speed_mps, leaves);
+                if !(driven_m <= rest_m) {
+                    let rule = format!(
+                        "the acceleration lane ends {rest_m:.1} m ahead, and the driver is still in it after {driven_m:.1} m"
+                    );
+                    return refuse("driver", "road.acceleration-lane", rule);
+                }
+            }
+            CheckedDriver::Human(human) if human.can_merge() => {
+                let braking_mps2 = LEAST_BRAKE_SHARE * friction * GRAVITY_MPS2;
+                if !(braking_mps2 >= ENTRY_STOP_MPS2) {
+                    let rule = format!(
+                        "a truck can brake by {braking_mps2:.1} m/s² on this road, and a driver in the acceleration \
+                         lane needs {ENTRY_STOP_MPS2} m/s² to stop before its end"
+                    );
+                    return refuse("start", "environment.friction", rule);
+                }
+                let needed_m = entry_stop_distance_m(self.start.speed_mps);
+                if !(rest_m >= needed_m) {
+                    let rule = format!(
+                        "the acceleration lane ends {rest_m:.1} m ahead, and at {:.1} m/s the driver needs \
+                         {needed_m:.1} m to stop",
+                        self.start.speed_mps
+                    );
+                    return refuse("start", "road.acceleration-lane", rule);
+                }
+            }
+            CheckedDriver::Human(_) | CheckedDriver::Ego(_) => {
+                let rule = format!(
+                    "lane {number} is the acceleration lane, and only `wiedemann99`, `idm` and `prescribed` leave it"
+                );
+                return refuse("driver", "start", rule);
+            }
         }
         Ok(())
     }
@@ -476,10 +493,12 @@ mod tests {
         assert!(scenario(2, on_ramp, follows, "").is_ok());
         assert!(scenario(2, on_ramp, "idm = {}", "").is_ok());
         let refused = |ego_lane, start, driver, more| scenario(ego_lane, start, driver, more).unwrap_err();
-        let error = refused(2, on_ramp, "prescribed = { profile = [[0.0, 25.0]] }", "");
-        assert!(error.contains("only `wiedemann99` and `idm` leave it"), "{error}");
         let error = refused(3, "lane = 1, s-m = 560.0, speed-mps = 25.0", follows, "");
-        assert!(error.contains("only `wiedemann99` and `idm` leave it"), "{error}");
+        assert!(error.contains("only `wiedemann99`, `idm` and `prescribed` leave it"), "{error}");
+        let overtakes =
+            "overtaker = { cut-out-thw-s = 0.3, follow = { idm = { time-gap-s = 0.1 } }, reaction-s = 1.0 }";
+        let error = refused(2, on_ramp, overtakes, "");
+        assert!(error.contains("only `wiedemann99`, `idm` and `prescribed` leave it"), "{error}");
         let error = refused(2, "lane = 3, s-m = 780.0, speed-mps = 25.0", follows, "");
         assert!(error.contains("to stop"), "{error}");
         let error = refused(2, on_ramp, follows, "environment = { friction = 0.3 }");
@@ -489,6 +508,21 @@ mod tests {
         assert!(
             scenario(1, beside, "prescribed = { profile = [[0.0, 25.0]] }", "environment = { friction = 0.3 }").is_ok()
         );
+    }
+
+    #[test]
+    fn a_prescribed_driver_leaves_the_acceleration_lane_before_its_end() {
+        // The lane ends some 288 m ahead of the bumper.
+        let start = "lane = 3, s-m = 560.0, speed-mps = 60.0";
+        let driver = |more: &str| format!("prescribed = {{ profile = [[0.0, 60.0]]{more} }}");
+        let changes = |at_s| driver(&format!(", lane-changes = [{{ at-s = {at_s}, to = 'left', duration-s = 4.0 }}]"));
+        assert!(scenario(2, start, &changes("4.7"), "").is_ok());
+        let error = scenario(2, start, &changes("4.9"), "").unwrap_err();
+        assert!(error.contains("is still in it after 294.0 m"), "{error}");
+        // Without a lane change, the run must end before the lane does.
+        let error = scenario(2, start, &driver(""), "").unwrap_err();
+        assert!(error.contains("is still in it after 300.0 m"), "{error}");
+        assert!(scenario(2, start, "prescribed = { profile = [[0.0, 25.0]] }", "").is_ok());
     }
 
     #[test]

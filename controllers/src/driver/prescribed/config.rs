@@ -1,6 +1,6 @@
 //! Configuration of a prescribed driver.
 
-use closecall_traffic::{Check, ConfigError, Lane, Num, Parameters, Problem, Range, Road};
+use closecall_traffic::{Check, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -184,6 +184,16 @@ impl Prescribed {
             })?;
         }
         Ok(())
+    }
+
+    /// Returns the time at which the first lane change begins, or `None` if the driver keeps its lane.
+    pub fn first_lane_change(&self) -> Option<Time> {
+        self.lane_changes.first().map(|change| change.at)
+    }
+
+    /// Returns the distance that a vehicle with the initial speed `start_mps` drives until a time (m).
+    pub fn distance_m(&self, start_mps: f64, until: Time) -> f64 {
+        self.speeds_from(start_mps).distance_m(until.s())
     }
 
     /// Returns the same driver with left and right exchanged.
