@@ -515,7 +515,8 @@ mod tests {
         // The lane ends some 288 m ahead of the bumper.
         let start = "lane = 3, s-m = 560.0, speed-mps = 60.0";
         let driver = |more: &str| format!("prescribed = {{ profile = [[0.0, 60.0]]{more} }}");
-        let changes = |at_s| driver(&format!(", lane-changes = [{{ at-s = {at_s}, to = 'left', duration-s = 4.0 }}]"));
+        let changes =
+            |at_s: &str| driver(&format!(", lane-changes = [{{ at-s = {at_s}, to = 'left', duration-s = 4.0 }}]"));
         assert!(scenario(2, start, &changes("4.7"), "").is_ok());
         let error = scenario(2, start, &changes("4.9"), "").unwrap_err();
         assert!(error.contains("is still in it after 294.0 m"), "{error}");
@@ -528,7 +529,7 @@ mod tests {
     #[test]
     fn nobody_enters_the_acceleration_lane_from_the_road() {
         let start = "lane = 2, s-m = 560.0, speed-mps = 25.0";
-        let change = |to| {
+        let change = |to: &str| {
             format!(
                 "prescribed = {{ profile = [[0.0, 25.0]], lane-changes = [{{ at-s = 1, to = '{to}', duration-s = 4 }}] }}"
             )

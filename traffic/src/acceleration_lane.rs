@@ -49,13 +49,18 @@ impl Check for AccelerationLaneConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<AccelerationLane, ConfigError> {
         let from_m = parameters.number(&self.from_m, "from-m", Range::closed(-10_000.0, 100_000.0))?;
-        let to_m = from_m + parameters.number(&self.length_m, "length-m", Range::closed(50.0, 5_000.0))?;
-        let taper_m = parameters.number(&self.taper_m, "taper-m", Range::closed(20.0, 1_000.0))?;
+        let to_m = from_m + parameters.number(&self.length_m, "length-m", AccelerationLane::LENGTH_M)?;
+        let taper_m = parameters.number(&self.taper_m, "taper-m", AccelerationLane::TAPER_M)?;
         Ok(AccelerationLane { from_m, to_m, taper_end_m: to_m + taper_m })
     }
 }
 
 impl AccelerationLane {
+    /// Lengths with the full width (m).
+    pub const LENGTH_M: Range = Range::closed(50.0, 5_000.0);
+    /// Lengths over which the lane narrows (m).
+    pub const TAPER_M: Range = Range::closed(20.0, 1_000.0);
+
     /// Returns the share of its full width that the lane has at `s_m` (0 to 1).
     pub fn width_share(&self, s_m: f64) -> f64 {
         ((self.taper_end_m - s_m) / (self.taper_end_m - self.to_m)).clamp(0.0, 1.0)
