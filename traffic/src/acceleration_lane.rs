@@ -11,7 +11,8 @@
 //! It is one of the lanes of the road, at the edge opposite to the overtaking side. Before `from_m`
 //! it is the ramp, which no vehicle leaves. A real ramp comes from the side; this one runs beside
 //! the road. Behind `to_m` the lane narrows linearly, and a paved shoulder of the same width takes
-//! its place. Guard rails and signs therefore stand in one line.
+//! its place. Guard rails and signs therefore stand in one line. The ground in the camera's images
+//! has the markings of a full lane everywhere: a simplification.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
