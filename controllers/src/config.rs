@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::driver::{
-    Driver, Idm, IdmConfig, Overtaker, OvertakerConfig, Prescribed, PrescribedConfig, Reaction, ReactionChange,
-    Wiedemann99Config, Wiedemann99Driver,
+    Driver, Follow, Idm, IdmConfig, MergingDriver, Overtaker, OvertakerConfig, Prescribed, PrescribedConfig, Reaction,
+    ReactionChange, Wiedemann99Config, Wiedemann99Driver,
 };
 use crate::ego::{EgoSettings, EgoStackConfig};
 
@@ -104,6 +104,30 @@ impl HumanDriver {
             Self::Wiedemann99(settings) => Box::new(Wiedemann99Driver::new(*settings)),
             Self::Idm(settings) => Box::new(settings.driver()),
             Self::Overtaker(settings) => Box::new(settings.driver()),
+        }
+    }
+
+    /// Returns whether the driver can leave an acceleration lane: it follows, and stays in its lane
+    /// otherwise.
+    pub fn can_merge(&self) -> bool {
+        match self {
+            Self::Wiedemann99(_) | Self::Idm(_) => true,
+            Self::Prescribed(_) | Self::Overtaker(_) => false,
+        }
+    }
+
+    /// Builds a new driver for one run that starts on an acceleration lane, as
+    /// [`build`](Self::build) does. The driver leaves the lane before its end, if it
+    /// [can](Self::can_merge).
+    pub fn build_merging(&self) -> Box<dyn Driver> {
+        let reaction_s = self.reaction_s().unwrap_or(0.0);
+        match self {
+            Self::Wiedemann99(settings) => {
+                let driver = Wiedemann99Driver::new(*settings);
+                Box::new(MergingDriver::new(driver, Follow::Wiedemann99(*settings), reaction_s))
+            }
+            Self::Idm(settings) => Box::new(MergingDriver::new(settings.driver(), Follow::Idm(*settings), reaction_s)),
+            Self::Prescribed(_) | Self::Overtaker(_) => self.build(),
         }
     }
 }

@@ -8,6 +8,7 @@ mod attention;
 mod idm;
 mod interface;
 mod lane_keeping;
+mod merging;
 mod overtaker;
 mod pedals;
 mod perception;
@@ -26,6 +27,8 @@ pub use interface::{
     Neighbours,
 };
 pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
+pub(crate) use merging::MergingDriver;
+pub use merging::{ENTRY_STOP_MPS2, entry_stop_distance_m};
 pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
 pub use perception::{Evidence, EvidenceConfig, PerceptionConfig, PerceptionSettings};
 pub use prescribed::{Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, RecordedConfig};

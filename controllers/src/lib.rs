@@ -29,12 +29,13 @@ pub mod reference;
 
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
-    DesiredSpeedNoise, Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig,
-    Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse,
-    LapseConfig, Lead, LogNormalConfig, Looks, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig,
-    PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionChange,
-    ReactionConfig, RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Weave,
-    Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
+    DesiredSpeedNoise, Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, ENTRY_STOP_MPS2,
+    Evidence, EvidenceConfig, Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig,
+    LaneNeighbours, Lapse, LapseConfig, Lead, LogNormalConfig, Looks, Neighbour, Neighbours, Overtaker,
+    OvertakerConfig, PerceptionConfig, PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig,
+    Reaction, ReactionChange, ReactionConfig, RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping,
+    SpeedKeepingConfig, Thresholds, Weave, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
+    entry_stop_distance_m,
 };
 pub use ego::{
     ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,

@@ -1,11 +1,13 @@
 //! Concrete scenarios: every value is a number, and every number has been checked.
 
 use closecall_controllers::external::VariableTable;
-use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
+use closecall_controllers::{
+    CheckedDriver, DriverConfig, ENTRY_STOP_MPS2, HumanDriver, LaneKeeping, SpeedKeeping, entry_stop_distance_m,
+};
 use closecall_sensors::Sensors;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Environment, LateralPath, Num, PHYSICS_STEP, Parameters, Problem, Range, Road, Time,
-    Vehicle, VehicleState,
+    ActorId, Check, ConfigError, Environment, GRAVITY_MPS2, LateralPath, Num, PHYSICS_STEP, Parameters, Problem, Range,
+    Road, Time, Vehicle, VehicleState,
 };
 
 use crate::coverage::CoveragePlan;
@@ -76,7 +78,8 @@ impl Check for ScenarioConfig {
         let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
         let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
         let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
-        let mut actors = self.check_actors(&road, environment.friction, parameters)?;
+        let duration = Time::from_s(duration_s);
+        let mut actors = self.check_actors(&road, (environment.friction, duration), parameters)?;
         let ego = only_ego(&actors)?;
         for (index, traffic) in self.traffic.iter().enumerate() {
             traffic::add(traffic, &mut actors, ego, &road, parameters)
@@ -90,7 +93,7 @@ impl Check for ScenarioConfig {
         sensors.check_mounting().map_err(|error| error.within("sensors"))?;
         Ok(Scenario {
             name: self.name.clone(),
-            duration: Time::from_s(duration_s),
+            duration,
             road,
             environment,
             ego,
@@ -215,7 +218,12 @@ impl ScenarioConfig {
         Ok(())
     }
 
-    fn check_actors(&self, road: &Road, friction: f64, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
+    fn check_actors(
+        &self,
+        road: &Road,
+        (friction, duration): (f64, Time),
+        parameters: &Parameters,
+    ) -> Result<Vec<Actor>, ConfigError> {
         let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
         let mut vehicles = Vec::with_capacity(self.actors.len());
         let mut fleets = Vec::with_capacity(self.actors.len());
@@ -238,6 +246,8 @@ impl ScenarioConfig {
         for (((index, actor), driver), path) in self.actors.iter().enumerate().zip(drivers).zip(paths) {
             check_path_grip(path.as_ref(), states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
+            let entering = Entering { driver: &driver, vehicle: &vehicles[index], start: &states[index] };
+            entering.check(road, friction, duration).map_err(|error| at(index, error))?;
             let Keeping { lane_keeping, speed_keeping } =
                 actor.check_keeping(parameters).map_err(|error| at(index, error))?;
             check_weaving(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
@@ -248,7 +258,7 @@ impl ScenarioConfig {
                 let lane = road.lane_at(states[index].d_m);
                 event
                     .then
-                    .check_lane_change((&actor.driver, lane), road.lanes())
+                    .check_lane_change((&actor.driver, lane), road)
                     .map_err(|error| locate(error.within("then")))?;
                 events.push(event);
             }
@@ -369,9 +379,72 @@ fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) ->
 fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
     match driver {
         CheckedDriver::Human(HumanDriver::Prescribed(prescribed)) => prescribed
-            .check_lanes(road.lane_at(start.d_m), road.lanes())
+            .check_lanes(road.lane_at(start.d_m), road)
             .map_err(|error| error.within("prescribed").within("driver")),
         _ => Ok(()),
+    }
+}
+
+/// Least share of the friction that the brakes of a vehicle can use (-): the share of a truck.
+const LEAST_BRAKE_SHARE: f64 = 0.75;
+
+/// An actor that may start in the acceleration lane.
+struct Entering<'a> {
+    driver: &'a CheckedDriver,
+    vehicle: &'a Vehicle,
+    start: &'a VehicleState,
+}
+
+impl Entering<'_> {
+    /// Checks that the actor leaves the acceleration lane before its end, or can stop there, if it
+    /// starts in that lane.
+    fn check(&self, road: &Road, friction: f64, duration: Time) -> Result<(), ConfigError> {
+        let Some(lane) = road.acceleration_lane() else { return Ok(()) };
+        let number = road.lane_at(self.start.d_m);
+        if road.entry_lane() != Some(number) {
+            return Ok(());
+        }
+        let rest_m = (lane.to_m - self.start.s_m) * (1.0 - road.curvature_per_m() * self.start.d_m)
+            - 0.5 * self.vehicle.dimensions.length_m;
+        let refuse = |key, other, rule| Err(ConfigError::new(key, Problem::Contradiction { other, rule }));
+        match self.driver {
+            CheckedDriver::Human(HumanDriver::Prescribed(driver)) => {
+                let leaves = driver.first_lane_change().filter(|leaves| *leaves < duration).unwrap_or(duration);
+                let driven_m = driver.distance_m(self.start.speed_mps, leaves);
+                if !(driven_m <= rest_m) {
+                    let rule = format!(
+                        "the acceleration lane ends {rest_m:.1} m ahead, and the driver is still in it after {driven_m:.1} m"
+                    );
+                    return refuse("driver", "road.acceleration-lane", rule);
+                }
+            }
+            CheckedDriver::Human(human) if human.can_merge() => {
+                let braking_mps2 = LEAST_BRAKE_SHARE * friction * GRAVITY_MPS2;
+                if !(braking_mps2 >= ENTRY_STOP_MPS2) {
+                    let rule = format!(
+                        "a truck can brake by {braking_mps2:.1} m/s² on this road, and a driver in the acceleration \
+                         lane needs {ENTRY_STOP_MPS2} m/s² to stop before its end"
+                    );
+                    return refuse("start", "environment.friction", rule);
+                }
+                let needed_m = entry_stop_distance_m(self.start.speed_mps);
+                if !(rest_m >= needed_m) {
+                    let rule = format!(
+                        "the acceleration lane ends {rest_m:.1} m ahead, and at {:.1} m/s the driver needs \
+                         {needed_m:.1} m to stop",
+                        self.start.speed_mps
+                    );
+                    return refuse("start", "road.acceleration-lane", rule);
+                }
+            }
+            CheckedDriver::Human(_) | CheckedDriver::Ego(_) => {
+                let rule = format!(
+                    "lane {number} is the acceleration lane, and only `wiedemann99`, `idm` and `prescribed` leave it"
+                );
+                return refuse("driver", "start", rule);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -386,5 +459,87 @@ fn only_ego(actors: &[Actor]) -> Result<usize, ConfigError> {
             let problem = Problem::Duplicate { value: format!("ego-stack of {}", actor.id) };
             Err(ConfigError::new("driver", problem).within_index(second).within("actor"))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::sampling::Design;
+    use crate::{Scenario, ScenarioFile};
+
+    const RAMP: &str = "acceleration-lane = { from-m = 600.0, length-m = 250.0, taper-m = 60.0 }";
+
+    /// The ego at 30 m/s in this lane, and a vehicle on a road of three lanes, the rightmost of which
+    /// is an acceleration lane.
+    fn scenario(ego_lane: u8, start: &str, driver: &str, more: &str) -> Result<Scenario, String> {
+        let text = format!(
+            "schema-version = 1\nname = 'ramp'\nduration-s = 5.0\nroad = {{ lanes = 3, {RAMP} }}\n{more}\n\
+             [[actor]]\nid = 'ego'\nvehicle = {{ class = 'car' }}\n\
+             start = {{ absolute = {{ lane = {ego_lane}, s-m = 500.0, speed-mps = 30.0 }} }}\n\
+             driver = {{ ego-stack = {{ acc = {{ time-gap-s = 0.7 }} }} }}\n\
+             [[actor]]\nid = 'ramp'\nvehicle = {{ class = 'car' }}\nstart = {{ absolute = {{ {start} }} }}\n\
+             driver = {{ {driver} }}\n"
+        );
+        let file = ScenarioFile::parse(Path::new("ramp.toml"), &text, &[]).map_err(|error| error.to_string())?;
+        let sample = file.space().sample(Design::Random, 0, 0, 1);
+        file.concrete(&sample).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_vehicle_in_the_acceleration_lane_needs_a_driver_that_leaves_it_and_room_to_stop() {
+        let (on_ramp, follows) = ("lane = 3, s-m = 560.0, speed-mps = 25.0", "wiedemann99 = {}");
+        assert!(scenario(2, on_ramp, follows, "").is_ok());
+        assert!(scenario(2, on_ramp, "idm = {}", "").is_ok());
+        let refused = |ego_lane, start, driver, more| scenario(ego_lane, start, driver, more).unwrap_err();
+        let error = refused(3, "lane = 1, s-m = 560.0, speed-mps = 25.0", follows, "");
+        assert!(error.contains("only `wiedemann99`, `idm` and `prescribed` leave it"), "{error}");
+        let overtakes =
+            "overtaker = { cut-out-thw-s = 0.3, follow = { idm = { time-gap-s = 0.1 } }, reaction-s = 1.0 }";
+        let error = refused(2, on_ramp, overtakes, "");
+        assert!(error.contains("only `wiedemann99`, `idm` and `prescribed` leave it"), "{error}");
+        let error = refused(2, "lane = 3, s-m = 780.0, speed-mps = 25.0", follows, "");
+        assert!(error.contains("to stop"), "{error}");
+        let error = refused(2, on_ramp, follows, "environment = { friction = 0.3 }");
+        assert!(error.contains("environment.friction"), "{error}");
+        // Beside the acceleration lane, all of this is allowed.
+        let beside = "lane = 2, s-m = 780.0, speed-mps = 25.0";
+        assert!(
+            scenario(1, beside, "prescribed = { profile = [[0.0, 25.0]] }", "environment = { friction = 0.3 }").is_ok()
+        );
+    }
+
+    #[test]
+    fn a_prescribed_driver_leaves_the_acceleration_lane_before_its_end() {
+        // The lane ends some 288 m ahead of the bumper.
+        let start = "lane = 3, s-m = 560.0, speed-mps = 60.0";
+        let driver = |more: &str| format!("prescribed = {{ profile = [[0.0, 60.0]]{more} }}");
+        let changes =
+            |at_s: &str| driver(&format!(", lane-changes = [{{ at-s = {at_s}, to = 'left', duration-s = 4.0 }}]"));
+        assert!(scenario(2, start, &changes("4.7"), "").is_ok());
+        let error = scenario(2, start, &changes("4.9"), "").unwrap_err();
+        assert!(error.contains("is still in it after 294.0 m"), "{error}");
+        // Without a lane change, the run must end before the lane does.
+        let error = scenario(2, start, &driver(""), "").unwrap_err();
+        assert!(error.contains("is still in it after 300.0 m"), "{error}");
+        assert!(scenario(2, start, "prescribed = { profile = [[0.0, 25.0]] }", "").is_ok());
+    }
+
+    #[test]
+    fn nobody_enters_the_acceleration_lane_from_the_road() {
+        let start = "lane = 2, s-m = 560.0, speed-mps = 25.0";
+        let change = |to: &str| {
+            format!(
+                "prescribed = {{ profile = [[0.0, 25.0]], lane-changes = [{{ at-s = 1, to = '{to}', duration-s = 4 }}] }}"
+            )
+        };
+        assert!(scenario(1, start, &change("left"), "").is_ok());
+        let error = scenario(1, start, &change("right"), "").unwrap_err();
+        assert!(error.contains("vehicles leave and do not enter"), "{error}");
+        let traffic = "[[traffic]]\nid = 'others'\ndraw = 0.5\nlanes = [3]\nvehicles = 2\nfrom-m = 150.0\n\
+                       mean-thw-s = 2.5\nspeed-mps = 25.0\ndriver = { idm = {} }";
+        let error = scenario(1, start, "idm = {}", traffic).unwrap_err();
+        assert!(error.contains("traffic[0].lanes[0]") && error.contains("through lanes"), "{error}");
     }
 }

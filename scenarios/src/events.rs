@@ -3,7 +3,8 @@
 use closecall_controllers::DriverConfig;
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{
-    ActorId, ConfigError, ENGAGEMENT_GAP_M, Lane, Num, Parameters, Problem, Range, Side, Time, Vehicle, VehicleState,
+    ActorId, ConfigError, ENGAGEMENT_GAP_M, Lane, Num, Parameters, Problem, Range, Road, Side, Time, Vehicle,
+    VehicleState,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -270,12 +271,12 @@ impl Effect {
         }
     }
 
-    /// Checks that an actor with this driver, which starts in lane `start` of `lanes`, can change
+    /// Checks that an actor with this driver, which starts in lane `start` of `road`, can change
     /// lanes.
     pub(super) fn check_lane_change(
         self,
         (driver, start): (&DriverConfig, Lane),
-        lanes: u8,
+        road: &Road,
     ) -> Result<(), ConfigError> {
         let Self::LaneChange { to, .. } = self else { return Ok(()) };
         let refuse = |other, rule: String| Err(ConfigError::new("lane-change", Problem::Contradiction { other, rule }));
@@ -286,14 +287,6 @@ impl Effect {
                     .to_owned(),
             );
         }
-        let exists = match to {
-            Side::Left => start.0 > 1,
-            Side::Right => start.0 < lanes,
-        };
-        if exists {
-            return Ok(());
-        }
-        let rule = format!("lane {} of {lanes} has no lane on that side, counted from 1 at the left", start.0);
-        refuse("start", rule)
+        road.lane_to_enter(start, to).map(|_| ()).or_else(|reason| refuse("start", reason.to_string()))
     }
 }

@@ -56,6 +56,9 @@ const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehi
 /// The scenario of the folder `anchor`: emergency braking under a human driver, held against crash records.
 const ANCHOR: [(&str, &str); 1] = embedded!["anchor": "anchor-lead-brakes"];
 
+/// The scenarios of the folder `ramp`: a vehicle merges from a ramp.
+const RAMP: [(&str, &str); 2] = embedded!["ramp": "ramp-merges", "ramp-merges-without-merge"];
+
 /// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
 /// base.
 const FAULTS: [(&str, &str); 82] = embedded![
@@ -158,7 +161,7 @@ fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// Returns all scenarios that have no base.
 fn plain() -> impl Iterator<Item = (&'static str, &'static str)> {
-    LIBRARY.into_iter().chain(TRAFFIC).chain(AS_RECORDED).chain(AEB).chain(ACC).chain(ANCHOR)
+    LIBRARY.into_iter().chain(TRAFFIC).chain(AS_RECORDED).chain(AEB).chain(ACC).chain(ANCHOR).chain(RAMP)
 }
 
 /// Returns the names of the scenarios that can be a base.
@@ -243,6 +246,7 @@ fn in_folder(folder: &str) -> &'static [(&'static str, &'static str)] {
         "aeb" => &AEB,
         "acc" => &ACC,
         "anchor" => &ANCHOR,
+        "ramp" => &RAMP,
         "faults" => &FAULTS,
         _ => &[],
     }
@@ -319,7 +323,7 @@ mod tests {
             names
         };
         let mut expected = names_in(&folder);
-        for family in ["traffic", "as-recorded", "aeb", "acc", "anchor", "faults"] {
+        for family in ["traffic", "as-recorded", "aeb", "acc", "anchor", "ramp", "faults"] {
             expected.extend(names_in(&folder.join(family)));
         }
         assert_eq!(names().collect::<Vec<_>>(), expected);

@@ -235,6 +235,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
             overtaking_side: approach.direction(),
             guard_rails: false,
             roadside: closecall_traffic::RoadsideConfig::default(),
+            acceleration_lane: None,
         },
         environment: Default::default(),
         actors: vec![

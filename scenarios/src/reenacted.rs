@@ -187,6 +187,7 @@ pub(super) fn with_actors(encounter: &RecordedEncounter, title: Title, actors: V
             overtaking_side: encounter.change.direction,
             guard_rails: false,
             roadside: closecall_traffic::RoadsideConfig::default(),
+            acceleration_lane: None,
         },
         environment: Default::default(),
         parameters: Default::default(),

@@ -174,11 +174,17 @@ impl<'a> Block<'a> {
         if config.lanes.is_empty() {
             return Err(ConfigError::new("lanes", Problem::Missing { needed: "at least one lane" }));
         }
+        let at = |index, problem| {
+            let path = KeyPath(vec![Segment::Key("lanes".to_owned()), Segment::Index(index)]);
+            Err(ConfigError { path, problem })
+        };
         for (index, lane) in config.lanes.iter().enumerate() {
             if !(1..=road.lanes()).contains(&lane.0) {
-                let problem = Problem::UnknownLane { value: lane.0, lanes: road.lanes() };
-                let path = KeyPath(vec![Segment::Key("lanes".to_owned()), Segment::Index(index)]);
-                return Err(ConfigError { path, problem });
+                return at(index, Problem::UnknownLane { value: lane.0, lanes: road.lanes() });
+            }
+            if road.entry_lane() == Some(*lane) {
+                let rule = "surrounding traffic starts in the through lanes".to_owned();
+                return at(index, Problem::Contradiction { other: "road.acceleration-lane", rule });
             }
         }
         let driver = config.driver.check(parameters).map_err(|error| error.within("driver"))?;

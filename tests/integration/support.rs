@@ -26,10 +26,13 @@ pub(crate) fn traffic_of_library() -> Vec<PathBuf> {
     scenarios_in(&library_folder().join("traffic"))
 }
 
-/// Returns the scenarios of the library in separate folders: the scenarios of other functions, and
-/// the headline as recorded.
+/// Returns the scenarios of the library in separate folders: the scenarios of other functions, those
+/// with a ramp, and the headline as recorded.
 pub(crate) fn families_of_library() -> Vec<PathBuf> {
-    ["aeb", "acc", "as-recorded", "anchor"].iter().flat_map(|name| scenarios_in(&library_folder().join(name))).collect()
+    ["aeb", "acc", "as-recorded", "anchor", "ramp"]
+        .iter()
+        .flat_map(|name| scenarios_in(&library_folder().join(name)))
+        .collect()
 }
 
 fn scenarios_in(folder: &Path) -> Vec<PathBuf> {

@@ -54,6 +54,7 @@
 //! | - | road frame `s_m`, `d_m` | - | Position along the road, and across it to the left. |
 
 mod absent;
+mod acceleration_lane;
 mod actor;
 pub mod atomic;
 pub mod bodies;
@@ -89,6 +90,7 @@ pub mod suggest;
 pub mod words;
 
 pub use absent::{Absent, Measured};
+pub use acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 pub use actor::{ActorId, InvalidActorId};
 pub use body_shape::BodyShape;
 pub use check::{Check, ConfigError, KeyPath, Problem, Range, Segment};
@@ -100,7 +102,7 @@ pub use optics::{KOSCHMIEDER, rain_db_per_km};
 pub use parameters::{Parameters, Value};
 pub use quintic::{MINIMUM_JERK_PEAK, Quintic, minimum_jerk};
 pub use random::{Exp1, StandardNormal};
-pub use road::{Lane, PlanePose, Road, RoadConfig, Side};
+pub use road::{Lane, NoLaneBeside, PlanePose, Road, RoadConfig, Side};
 pub use roadside::{Roadside, RoadsideConfig};
 pub use scene::{Scene, SceneVehicle};
 pub use seed::{Stream, stream};

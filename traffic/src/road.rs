@@ -10,12 +10,15 @@
 //!
 //! The reference line is d = 0: an arc of constant curvature, positive if the road bends to the
 //! left.
+//!
+//! One lane may be an acceleration lane: see [`AccelerationLane`].
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
 use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig, maths};
 
@@ -49,6 +52,25 @@ impl fmt::Display for Lane {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.0)
     }
+}
+
+/// Why a vehicle cannot change to the lane beside its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoLaneBeside {
+    /// The road ends there.
+    #[error("lane {lane} of {lanes} has no lane on that side, counted from 1 at the left")]
+    OffRoad {
+        /// The lane of the vehicle.
+        lane: Lane,
+        /// The number of lanes.
+        lanes: u8,
+    },
+    /// The lane is the acceleration lane.
+    #[error("lane {lane} is the acceleration lane, which vehicles leave and do not enter")]
+    Entry {
+        /// The acceleration lane.
+        lane: Lane,
+    },
 }
 
 /// A pose in the Cartesian plane.
@@ -86,6 +108,9 @@ pub struct RoadConfig {
     /// Other things that stand along the road. Default: none.
     #[serde(default, skip_serializing_if = "RoadsideConfig::is_empty")]
     pub roadside: RoadsideConfig,
+    /// The acceleration lane of a ramp. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub acceleration_lane: Option<AccelerationLaneConfig>,
 }
 
 fn default_lane_width() -> Num {
@@ -112,6 +137,7 @@ pub struct Road {
     overtaking_side: Side,
     guard_rails: bool,
     roadside: Roadside,
+    acceleration_lane: Option<AccelerationLane>,
     /// Whether the road runs against the traffic, so that its left edge is the right edge of the
     /// traffic.
     is_reversed: bool,
@@ -125,6 +151,10 @@ impl Check for RoadConfig {
             let problem = Problem::WrongCount { value: self.lanes.into(), allowed: "a number of lanes from 1 to 8" };
             return Err(ConfigError::new("lanes", problem));
         }
+        if self.acceleration_lane.is_some() && self.lanes < 2 {
+            let rule = "the acceleration lane is one of the lanes, and vehicles leave it for another one".to_owned();
+            return Err(ConfigError::new("acceleration-lane", Problem::Contradiction { other: "lanes", rule }));
+        }
         let number = |num, key, range| parameters.number(num, key, range);
         Ok(Road {
             lanes: self.lanes,
@@ -134,6 +164,12 @@ impl Check for RoadConfig {
             overtaking_side: self.overtaking_side,
             guard_rails: self.guard_rails,
             roadside: self.roadside.check(parameters).map_err(|error| error.within("roadside"))?,
+            acceleration_lane: self
+                .acceleration_lane
+                .as_ref()
+                .map(|config| config.check(parameters))
+                .transpose()
+                .map_err(|error| error.within("acceleration-lane"))?,
             is_reversed: false,
         })
     }
@@ -157,6 +193,7 @@ impl Road {
             overtaking_side: Side::Left,
             guard_rails: false,
             roadside: Roadside::default(),
+            acceleration_lane: None,
             is_reversed: false,
         }
     }
@@ -171,6 +208,13 @@ impl Road {
     #[must_use]
     pub fn with_lane_width(self, lane_width_m: f64) -> Self {
         Self { lane_width_m: lane_width_m.clamp(2.5, 5.0), ..self }
+    }
+
+    /// Returns the same road with an acceleration lane, which is one of its lanes. A road of one lane
+    /// has none.
+    #[must_use]
+    pub fn with_acceleration_lane(self, lane: AccelerationLane) -> Self {
+        Self { acceleration_lane: (self.lanes > 1).then_some(lane), ..self }
     }
 
     /// Returns the mirror image of a straight road: vehicles overtake on the other side, and lane 1
@@ -189,7 +233,9 @@ impl Road {
         // it bends to the other side.
         let curvature_per_m = -self.curvature_per_m / (1.0 - self.curvature_per_m * self.right_edge_m());
         let overtaking_side = self.overtaking_side.opposite();
-        Self { curvature_per_m, overtaking_side, is_reversed: !self.is_reversed, ..self }
+        let acceleration_lane =
+            self.acceleration_lane.map(|lane| lane.moved(|s_m| self.reversed_position_m(s_m, 0.0).0));
+        Self { curvature_per_m, overtaking_side, acceleration_lane, is_reversed: !self.is_reversed, ..self }
     }
 
     /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point
@@ -248,6 +294,41 @@ impl Road {
         &self.roadside
     }
 
+    /// Returns the acceleration lane, or `None` if the road has none.
+    pub fn acceleration_lane(&self) -> Option<&AccelerationLane> {
+        self.acceleration_lane.as_ref()
+    }
+
+    /// Returns the number of the acceleration lane: the lane at the edge opposite to the overtaking
+    /// side. Returns `None` if the road has no acceleration lane.
+    pub fn entry_lane(&self) -> Option<Lane> {
+        self.acceleration_lane.map(|_| match self.overtaking_side {
+            Side::Left => Lane(self.lanes),
+            Side::Right => Lane(1),
+        })
+    }
+
+    /// Returns the lateral position of a boundary of the lanes at `s_m` (m). Boundary 0 is the left
+    /// edge of lane 1, and boundary n is the right edge of lane n. The outer boundary of the
+    /// acceleration lane moves inwards where the lane narrows.
+    pub fn boundary_at_m(&self, number: u8, s_m: f64) -> f64 {
+        let full_m = -f64::from(number) * self.lane_width_m;
+        let Some(lane) = self.acceleration_lane else { return full_m };
+        let missing_m = || (1.0 - lane.width_share(s_m)) * self.lane_width_m;
+        match self.overtaking_side {
+            Side::Left if number == self.lanes => full_m + missing_m(),
+            Side::Right if number == 0 => full_m - missing_m(),
+            Side::Left | Side::Right => full_m,
+        }
+    }
+
+    /// Returns the lateral positions of the left and of the right edge of the lanes at `s_m` (m).
+    /// They differ from 0 and from [`right_edge_m`](Self::right_edge_m) where the acceleration lane
+    /// narrows and beyond its end.
+    pub fn edges_at_m(&self, s_m: f64) -> [f64; 2] {
+        [0, self.lanes].map(|number| self.boundary_at_m(number, s_m))
+    }
+
     /// Returns the same road with guard rails on both sides.
     #[must_use]
     pub const fn with_guard_rails(self) -> Self {
@@ -278,6 +359,18 @@ impl Road {
         match side {
             Side::Left => (lane.0 > 1).then(|| Lane(lane.0 - 1)),
             Side::Right => (lane.0 < self.lanes).then(|| Lane(lane.0 + 1)),
+        }
+    }
+
+    /// Returns the lane to which a vehicle in `lane` changes on one side.
+    ///
+    /// # Errors
+    /// [`NoLaneBeside`] if the road has no lane there, or only its acceleration lane.
+    pub fn lane_to_enter(&self, lane: Lane, side: Side) -> Result<Lane, NoLaneBeside> {
+        match self.beside(lane, side) {
+            None => Err(NoLaneBeside::OffRoad { lane, lanes: self.lanes }),
+            Some(target) if self.entry_lane() == Some(target) => Err(NoLaneBeside::Entry { lane: target }),
+            Some(target) => Ok(target),
         }
     }
 
@@ -334,6 +427,65 @@ mod tests {
         assert_eq!(road.beside(Lane(1), Side::Left), None);
         assert_eq!(road.beside(Lane(2), Side::Left), Some(Lane(1)));
         assert_eq!(road.beside(Lane(3), Side::Right), None);
+    }
+
+    const ENTRY: AccelerationLane = AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };
+
+    #[test]
+    fn the_acceleration_lane_is_the_lane_opposite_to_the_overtaking_side() {
+        let road = Road::straight(3).with_acceleration_lane(ENTRY);
+        assert_eq!(road.entry_lane(), Some(Lane(3)));
+        assert_eq!(
+            [0.0, 350.0, 380.0, 410.0, 900.0].map(|s_m| road.edges_at_m(s_m)[1]),
+            [-11.25, -11.25, -9.375, -7.5, -7.5]
+        );
+        let mirrored = road.mirrored().unwrap();
+        assert_eq!(mirrored.entry_lane(), Some(Lane(1)));
+        assert_eq!(mirrored.edges_at_m(380.0), [-1.875, -11.25]);
+        assert_eq!(Road::straight(3).entry_lane(), None);
+        assert_eq!(Road::straight(3).edges_at_m(900.0), [0.0, -11.25]);
+        assert_eq!(Road::straight(1).with_acceleration_lane(ENTRY).acceleration_lane(), None);
+    }
+
+    #[test]
+    fn the_acceleration_lane_of_a_reversed_road_lies_at_the_same_places() {
+        for curvature in [0.0, 0.002, -0.002] {
+            let road = Road::straight(3).with_curvature(curvature).with_acceleration_lane(ENTRY);
+            let reversed = road.reversed();
+            assert_eq!(reversed.entry_lane(), Some(Lane(1)));
+            for s_m in [50.0, 360.0, 400.0, 500.0] {
+                let edge_m = road.edges_at_m(s_m)[1];
+                let (there_m, expected_m) = road.reversed_position_m(s_m, edge_m);
+                let [left_m, right_m] = reversed.edges_at_m(there_m);
+                assert!((left_m - expected_m).abs() < 1e-9, "{left_m} {expected_m}");
+                assert_eq!(right_m, -11.25);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_acceleration_lane_is_refused_by_its_key() {
+        let check = |lanes, length_m: f64| {
+            let config = RoadConfig {
+                lanes,
+                lane_width_m: default_lane_width(),
+                curvature_per_m: default_curvature(),
+                speed_limit_mps: default_speed_limit(),
+                overtaking_side: Side::Left,
+                guard_rails: false,
+                roadside: RoadsideConfig::default(),
+                acceleration_lane: Some(AccelerationLaneConfig {
+                    from_m: 100.0.into(),
+                    length_m: length_m.into(),
+                    taper_m: 60.0.into(),
+                }),
+            };
+            config.check(&Parameters::default()).map_err(|error| error.path.to_string())
+        };
+        assert_eq!(check(3, 250.0).unwrap().acceleration_lane(), Some(&ENTRY));
+        assert_eq!(check(1, 250.0).unwrap_err(), "acceleration-lane");
+        assert_eq!(check(3, 10.0).unwrap_err(), "acceleration-lane.length-m");
+        assert_eq!(check(3, f64::NAN).unwrap_err(), "acceleration-lane.length-m");
     }
 
     proptest! {

@@ -78,6 +78,7 @@ fn road(guard_rails: bool) -> Road {
         overtaking_side: closecall_traffic::Side::Left,
         guard_rails,
         roadside: closecall_traffic::RoadsideConfig::default(),
+        acceleration_lane: None,
     };
     config.check(&Parameters::default()).expect("a valid road")
 }

@@ -534,6 +534,10 @@ pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bo
             }
             DriverConfig::EgoStack(_) | DriverConfig::Prescribed(_) => {}
         }
+        let starts = scenario.actors.iter().find(|checked| checked.id == *id).map(|checked| checked.start.d_m);
+        if starts.is_some_and(|d_m| scenario.road.entry_lane() == Some(scenario.road.lane_at(d_m))) {
+            list.push(format!("{id}: when it leaves the acceleration lane: it finds a gap itself"));
+        }
         if actor.lane_keeping.is_some() {
             list.push(format!("{id}: its weaving within the lane"));
         }
@@ -582,6 +586,9 @@ pub(super) fn unsaid_of_world(config: &ScenarioConfig, scenario: &Scenario) -> V
         list.push(
             "overtaking on the right: the road has right-hand traffic, so that its lanes run along it".to_owned(),
         );
+        if scenario.road.acceleration_lane().is_some() {
+            list.push("the end of the acceleration lane: the lane goes on".to_owned());
+        }
     }
     list
 }

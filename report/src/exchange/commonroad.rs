@@ -41,7 +41,7 @@ pub(super) fn document(scenario: &Scenario, motion: &Motion, road: UsedRoad<'_>)
         .with("date", today())
         .child(location)
         .child(tags)
-        .children((1..=scenario.road.lanes()).map(|lane| lanelet(scenario, Lane(lane), road)))
+        .children((1..=scenario.road.lanes()).filter_map(|lane| lanelet(scenario, Lane(lane), road)))
         .children(others.filter_map(|index| obstacle(scenario, motion, index)))
         .children(planning_problem(scenario, motion))
         .document()
@@ -64,29 +64,40 @@ fn point(x_m: f64, y_m: f64) -> Element {
     Element::new("point").child(text("x", x_m)).child(text("y", y_m))
 }
 
-fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Element {
-    let [start_m, end_m] = road.range_m();
+/// Returns a lane, or `None` if the acceleration lane ends before the part of the road that is used.
+/// Lanelets beside each other have the same ends: the acceleration lane is beside none.
+fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Option<Element> {
+    let [start_m, mut end_m] = road.range_m();
+    let entry = scenario.road.entry_lane();
+    if let Some(acceleration_lane) = scenario.road.acceleration_lane().filter(|_| entry == Some(lane)) {
+        end_m = end_m.min(acceleration_lane.taper_end_m);
+    }
+    if !(start_m < end_m) {
+        return None;
+    }
     let count = ((end_m - start_m) / POINT_SPACING_M).ceil().max(1.0);
     let bound = |name, number: u8| {
-        let d_m = -f64::from(number) * scenario.road.lane_width_m();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a road has some thousand points")]
         let points = (0..=count as u32).map(|index| {
-            let pose = scenario.road.plane_pose(start_m + (end_m - start_m) * f64::from(index) / count, d_m, 0.0);
+            let s_m = start_m + (end_m - start_m) * f64::from(index) / count;
+            let pose = scenario.road.plane_pose(s_m, scenario.road.boundary_at_m(number, s_m), 0.0);
             point(pose.x_m, pose.y_m)
         });
         let is_edge = number == 0 || number == scenario.road.lanes();
         Element::new(name).children(points).child(text("lineMarking", if is_edge { "solid" } else { "dashed" }))
     };
     let beside = |name, side| {
-        scenario.road.beside(lane, side).map(|other| Element::new(name).with("ref", other).with("drivingDir", "same"))
+        let other = scenario.road.beside(lane, side).filter(|other| entry != Some(lane) && entry != Some(*other));
+        other.map(|other| Element::new(name).with("ref", other).with("drivingDir", "same"))
     };
-    Element::new("lanelet")
+    let lanelet = Element::new("lanelet")
         .with("id", lane)
         .child(bound("leftBound", lane.0 - 1))
         .child(bound("rightBound", lane.0))
         .children(beside("adjacentLeft", Side::Left))
         .children(beside("adjacentRight", Side::Right))
-        .child(text("laneletType", "highway"))
+        .child(text("laneletType", "highway"));
+    Some(lanelet)
 }
 
 /// Returns the elements of a state that all kinds of states have.

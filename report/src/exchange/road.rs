@@ -4,8 +4,13 @@
 //!  Closecall   d = 0 ─── left edge ──▶ s       lane 1, 2, … n
 //!  OpenDRIVE   t = 0 ─ reference line ─▶ s − s₀   lane −1, −2, … −n
 //! ```
+//!
+//! An acceleration lane is lane −n, in three lane sections: with the full width, with a width that
+//! falls to 0, and without the lane. Before the lane begins, the marking to its left is solid. If
+//! traffic overtakes on the right, the acceleration lane is lane −1; the file has its full width
+//! everywhere.
 
-use closecall_traffic::Road;
+use closecall_traffic::{AccelerationLane, Lane, Road, Side};
 
 use super::element::Element;
 use crate::date::today;
@@ -68,29 +73,12 @@ impl<'a> UsedRoad<'a> {
             .with("length", self.length_m)
             .child(shape);
         let speed = Element::new("speed").with("max", self.road.speed_limit_mps()).with("unit", "m/s");
-        let lanes = self.road.lanes();
-        let centre =
-            Element::new("lane").with("id", 0).with("type", "none").with("level", "false").child(marking("solid"));
-        let right = (1..=lanes).map(|lane| {
-            let width = Element::new("width")
-                .with("sOffset", 0)
-                .with("a", self.road.lane_width_m())
-                .with("b", 0)
-                .with("c", 0)
-                .with("d", 0);
-            let line = if lane == lanes { "solid" } else { "broken" };
-            Element::new("lane")
-                .with("id", format!("-{lane}"))
-                .with("type", "driving")
-                .with("level", "false")
-                .child(width)
-                .child(marking(line))
-        });
-        // The standard lists the lanes of a section with descending numbers: from left to right.
-        let section = Element::new("laneSection")
-            .with("s", 0)
-            .child(centre.within("center"))
-            .child(Element::new("right").children(right));
+        let sections = self.sections();
+        let mut lanes = Element::new("lanes");
+        for (number, section) in sections.iter().enumerate() {
+            let before = number.checked_sub(1).map(|number| &sections[number]);
+            lanes = lanes.child(self.section(section, [before, sections.get(number + 1)]));
+        }
         Element::new("road")
             .with("name", name)
             .with("length", self.length_m)
@@ -99,17 +87,151 @@ impl<'a> UsedRoad<'a> {
             .with("rule", "RHT")
             .child(Element::new("type").with("s", 0).with("type", "motorway").child(speed))
             .child(geometry.within("planView"))
-            .child(section.within("lanes"))
+            .child(lanes)
+    }
+
+    /// Returns the acceleration lane, if it is the rightmost lane.
+    fn narrowing_lane(&self) -> Option<&AccelerationLane> {
+        self.road.acceleration_lane().filter(|_| self.road.overtaking_side() == Side::Left)
+    }
+
+    /// Returns the stretches of the road with the same lanes, from the start of the file's road on.
+    fn sections(&self) -> Vec<Section> {
+        let lanes = self.road.lanes();
+        let Some(lane) = self.narrowing_lane() else {
+            return vec![Section { from_m: 0.0, lanes, is_taper: false }];
+        };
+        let [narrows_m, ends_m] = [lane.to_m, lane.taper_end_m].map(|s_m| s_m - self.start_m);
+        let stretches = [
+            (Section { from_m: 0.0, lanes, is_taper: false }, narrows_m),
+            (Section { from_m: narrows_m.max(0.0), lanes, is_taper: true }, ends_m),
+            (Section { from_m: ends_m.max(0.0), lanes: lanes - 1, is_taper: false }, self.length_m),
+        ];
+        let is_on_road = |(section, to_m): &(Section, f64)| section.from_m < to_m.min(self.length_m);
+        stretches.into_iter().filter(is_on_road).map(|(section, _)| section).collect()
+    }
+
+    /// Returns a lane section. `beside` holds the sections before and behind it.
+    fn section(&self, section: &Section, beside: [Option<&Section>; 2]) -> Element {
+        let centre =
+            Element::new("lane").with("id", 0).with("type", "none").with("level", "false").child(marking("solid", 0.0));
+        let right = (1..=section.lanes).map(|lane| {
+            let ends = [("predecessor", beside[0]), ("successor", beside[1])];
+            let links = ends.into_iter().filter(|(_, other)| other.is_some_and(|other| lane <= other.lanes));
+            let links: Vec<Element> =
+                links.map(|(name, _)| Element::new(name).with("id", format!("-{lane}"))).collect();
+            let link = (!links.is_empty()).then(|| Element::new("link").children(links));
+            Element::new("lane")
+                .with("id", format!("-{lane}"))
+                .with("type", "driving")
+                .with("level", "false")
+                .children(link)
+                .child(self.width(section, Lane(lane)))
+                .children(self.markings(section, Lane(lane)))
+        });
+        // The standard lists the lanes of a section with descending numbers: from left to right.
+        Element::new("laneSection")
+            .with("s", section.from_m)
+            .child(centre.within("center"))
+            .child(Element::new("right").children(right))
+    }
+
+    fn width(&self, section: &Section, lane: Lane) -> Element {
+        let full_m = self.road.lane_width_m();
+        let width = Element::new("width").with("sOffset", 0);
+        let width = match self.narrowing_lane().filter(|_| section.is_taper && lane.0 == section.lanes) {
+            Some(narrowing) => width
+                .with("a", full_m * narrowing.width_share(self.start_m + section.from_m))
+                .with("b", -full_m / (narrowing.taper_end_m - narrowing.to_m)),
+            None => width.with("a", full_m).with("b", 0),
+        };
+        width.with("c", 0).with("d", 0)
+    }
+
+    /// Returns the markings to the right of a lane.
+    fn markings(&self, section: &Section, lane: Lane) -> Vec<Element> {
+        if lane.0 == section.lanes {
+            return vec![marking("solid", 0.0)];
+        }
+        let begins_m = self
+            .narrowing_lane()
+            .filter(|_| lane.0 + 1 == self.road.lanes())
+            .map_or(0.0, |entry| entry.from_m - self.start_m - section.from_m);
+        match begins_m > 0.0 {
+            false => vec![marking("broken", 0.0)],
+            true if begins_m < self.length_m - section.from_m => {
+                vec![marking("solid", 0.0), marking("broken", begins_m)]
+            }
+            true => vec![marking("solid", 0.0)],
+        }
     }
 }
 
-fn marking(kind: &str) -> Element {
+/// A stretch of the road with the same lanes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Section {
+    /// Where it begins, from the start of the file's road (m).
+    from_m: f64,
+    lanes: u8,
+    /// Whether the rightmost lane narrows to nothing.
+    is_taper: bool,
+}
+
+/// Returns a marking that begins this far behind the start of its lane section (m).
+fn marking(kind: &str, from_m: f64) -> Element {
     let lane_change = if kind == "solid" { "none" } else { "both" };
     Element::new("roadMark")
-        .with("sOffset", 0)
+        .with("sOffset", from_m)
         .with("type", kind)
         .with("weight", "standard")
         .with("color", "standard")
         .with("width", MARKING_WIDTH_M)
         .with("laneChange", lane_change)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ENTRY: AccelerationLane = AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };
+
+    /// The document of a road from −500 m to `last_m` + 500 m.
+    fn document(road: &Road, last_m: f64) -> String {
+        UsedRoad::new(road, [0.0, last_m].into_iter()).document("road")
+    }
+
+    fn count(text: &str, part: &str) -> usize {
+        text.matches(part).count()
+    }
+
+    #[test]
+    fn an_acceleration_lane_narrows_in_a_lane_section_and_is_not_in_the_next() {
+        let plain = document(&Road::straight(3), 400.0);
+        assert_eq!((count(&plain, "<laneSection"), count(&plain, "<link"), count(&plain, "id=\"-3\"")), (1, 0, 1));
+        let text = document(&Road::straight(3).with_acceleration_lane(ENTRY), 400.0);
+        assert_eq!(count(&text, "<laneSection"), 3);
+        for start in ["<laneSection s=\"0\">", "<laneSection s=\"850\">", "<laneSection s=\"910\">"] {
+            assert_eq!(count(&text, start), 1, "{start}: {text}");
+        }
+        assert_eq!(count(&text, "<lane id=\"-3\""), 2);
+        assert_eq!(count(&text, "a=\"3.75\" b=\"-0.0625\""), 1);
+        // Lanes 1 and 2 go on at both ends of the middle section; lane 3 does at its start alone.
+        assert_eq!((count(&text, "<successor"), count(&text, "<predecessor")), (5, 5));
+        // The marking is broken from the end of the ramp on, 600 m behind the start of the file's road.
+        let first = text.split("<laneSection").nth(1).unwrap();
+        assert_eq!(count(first, "sOffset=\"600\" type=\"broken\""), 1, "{first}");
+    }
+
+    #[test]
+    fn a_file_of_a_part_of_the_road_has_the_lanes_of_that_part() {
+        let road =
+            Road::straight(3).with_acceleration_lane(AccelerationLane { to_m: 5_350.0, taper_end_m: 5_410.0, ..ENTRY });
+        assert_eq!(count(&document(&road, 400.0), "<laneSection"), 1);
+        let passed = AccelerationLane { from_m: -2_000.0, to_m: -1_000.0, taper_end_m: -900.0 };
+        let text = document(&Road::straight(3).with_acceleration_lane(passed), 400.0);
+        assert_eq!((count(&text, "<laneSection"), count(&text, "<lane id=\"-3\"")), (1, 0));
+        // On the right-overtaking side the lane is the leftmost, whose width the file does not change.
+        let mirrored = Road::straight(3).with_acceleration_lane(ENTRY).mirrored().unwrap();
+        assert_eq!(count(&document(&mirrored, 400.0), "<laneSection"), 1);
+    }
 }

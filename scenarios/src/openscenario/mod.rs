@@ -14,6 +14,7 @@ mod condition;
 mod distribution;
 mod dom;
 mod entities;
+mod entry_lane;
 mod follow;
 mod formula;
 mod plane;
@@ -498,6 +499,13 @@ fn scenario_text(
     let road = played.road;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let limit = road.speed_limit_mps.filter(|limit| *limit > 0.0 && *limit <= 100.0);
+    let acceleration_lane = road.acceleration_lane.map(|lane| {
+        let [length_m, taper_m] = [lane.to_m - lane.from_m, lane.taper_end_m - lane.to_m];
+        format!(
+            ", acceleration-lane = {{ from-m = {:?}, length-m = {length_m:?}, taper-m = {taper_m:?} }}",
+            lane.from_m
+        )
+    });
     let mut actors = String::new();
     let mut names: Vec<String> = Vec::new();
     for (index, start) in starts.iter().enumerate() {
@@ -588,13 +596,14 @@ fn scenario_text(
     let _ = write!(
         text,
         "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
-         road = {{ lanes = {}, lane-width-m = {:?}, curvature-per-m = {:?}{}{} }}\n",
+         road = {{ lanes = {}, lane-width-m = {:?}, curvature-per-m = {:?}{}{}{} }}\n",
         kebab(&stem),
         road.lanes.len(),
         road.lane_width_m,
         road.curvature_per_m,
         limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),
         if road.is_left_hand { ", overtaking-side = \"right\"" } else { "" },
+        acceleration_lane.unwrap_or_default(),
     );
     if !environment.is_empty() {
         let _ = writeln!(text, "environment = {{ {environment} }}");

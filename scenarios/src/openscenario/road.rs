@@ -4,15 +4,17 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use closecall_traffic::Road;
+use closecall_traffic::{AccelerationLane, Road};
 
 use super::dom::{ImportError, Node, parse};
+use super::entry_lane;
 use super::plane::ReferenceLine;
 use super::reader::Reader;
 use super::shape;
 
 /// Names of the lane types on which vehicles drive.
-const DRIVING: [&str; 8] = ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
+pub(super) const DRIVING: [&str; 8] =
+    ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
 
 /// Numbers of lanes of a scenario file.
 const LANES: std::ops::RangeInclusive<usize> = 1..=8;
@@ -34,6 +36,7 @@ pub(super) struct ImportedRoad {
     pub(super) centres_m: Vec<f64>,
     pub(super) lane_width_m: f64,
     pub(super) curvature_per_m: f64,
+    pub(super) acceleration_lane: Option<AccelerationLane>,
     /// The reference line, or `None` if it is neither one line nor one arc.
     pub(super) line: Option<ReferenceLine>,
     pub(super) speed_limit_mps: Option<f64>,
@@ -90,9 +93,6 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
     let Some(section) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
     let mut notes = Vec::new();
-    if lanes.all("laneSection").count() > 1 {
-        notes.push("lanes that begin or end: the lanes are those of the first section".to_owned());
-    }
     // With left-hand traffic, the lanes along the road are those on the left.
     let is_left_hand = match road.raw("rule") {
         Some("LHT") => true,
@@ -100,6 +100,10 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         Some(other) => return Err(road.error(path, format!("`rule` is `{other}`; one of RHT, LHT is needed"))),
     };
     let side = if is_left_hand { "left" } else { "right" };
+    let entry = entry_lane::find(lanes, side, length_m);
+    if lanes.all("laneSection").count() > 1 && entry.is_none() {
+        notes.push("lanes that begin or end: the lanes are those of the first section".to_owned());
+    }
     let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
     let mut driving: Vec<(i32, f64)> = Vec::new();
     for node in along.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
@@ -121,6 +125,10 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         }
         driving.push((id, width_m));
     }
+    // The acceleration lane may begin in a later section.
+    let first_entry = entry.filter(|entry| driving.iter().all(|(id, _)| *id != entry.id));
+    let last_width_m = first_entry.and_then(|_| driving.iter().max_by_key(|lane| lane.0.abs())).map(|lane| lane.1);
+    driving.extend(first_entry.map(|entry| (entry.id, entry.width_m)));
     driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
     let used_lane = match used {
         UsedRoad::Lane { lane, .. } => driving.iter().find(|(id, _)| id == lane),
@@ -149,7 +157,15 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     }
     let curvature_per_m = curvature(path, road, &mut notes)?;
     let speed_limit_mps = road.at(&["type", "speed"]).map(|speed| speed_limit(path, speed)).transpose()?.flatten();
-    let centres_m = centres_m(lanes, along, &driving);
+    let mut centres_m = centres_m(lanes, along, &driving);
+    if let (Some(entry), Some(width_m)) = (first_entry, last_width_m) {
+        let to_centre_m = 0.5 * (width_m + entry.width_m);
+        match (is_left_hand, centres_m.first().copied(), centres_m.last().copied()) {
+            (true, Some(first_m), _) => centres_m.insert(0, first_m + to_centre_m),
+            (false, _, Some(last_m)) => centres_m.push(last_m - to_centre_m),
+            _ => {}
+        }
+    }
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
     let line = reference_line(path, road, curvature_per_m);
     let id = road_id.to_owned();
@@ -161,6 +177,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         centres_m,
         lane_width_m,
         curvature_per_m,
+        acceleration_lane: entry.map(|entry| entry.positions),
         line,
         speed_limit_mps,
         notes,

@@ -115,6 +115,7 @@ fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
         overtaking_side: Side::Left,
         guard_rails: rng.random_bool(0.5),
         roadside: closecall_traffic::RoadsideConfig::default(),
+        acceleration_lane: None,
     };
     config.check(&Parameters::default())
 }

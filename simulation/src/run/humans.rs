@@ -26,6 +26,9 @@ pub(super) fn human_drivers(scenario: &Scenario, key: RunKey, settings: &EgoSett
     let mut humans = Vec::with_capacity(scenario.actors.len());
     for (actor, setup) in scenario.actors.iter().enumerate() {
         let driver = match &setup.driver {
+            CheckedDriver::Human(human) if starts_in_acceleration_lane(setup, &scenario.road) => {
+                Some(human.build_merging())
+            }
             CheckedDriver::Human(human) => Some(human.build()),
             CheckedDriver::Ego(_) => settings.driver().map(EgoDriver::build),
         };
@@ -40,6 +43,10 @@ pub(super) fn human_drivers(scenario: &Scenario, key: RunKey, settings: &EgoSett
         }
     }
     humans
+}
+
+fn starts_in_acceleration_lane(actor: &Actor, road: &Road) -> bool {
+    road.entry_lane() == Some(road.lane_at(actor.start.d_m))
 }
 
 /// Returns how far the driver of each of `actors` vehicles looks. All others look ahead only.

@@ -7,7 +7,7 @@ use crate::driver::perception::{PerceivedLane, PerceivedVehicle};
 const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 
 /// Time headway left to a follower in the passing lane (s): an assumption; 0 to 1 are plausible.
-const FOLLOWER_HEADWAY_S: f64 = 0.3;
+pub(in crate::driver) const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
 /// Least gain of speed for which a driver overtakes (m/s). The own desired speed and the speed of a
 /// lead vehicle in the passing lane must both exceed the speed of the vehicle to overtake by this
@@ -20,15 +20,16 @@ pub(super) const MIN_GAIN_MPS: f64 = 1.0;
 /// ahead to matter: an assumption; 0.1 to 0.5 are plausible.
 const IRRELEVANT_LEAD_BRAKING_SHARE: f64 = 0.25;
 
-/// Braking that an overtaking driver accepts, of itself and of the follower in the adjacent lane.
+/// Braking that a driver who changes lanes accepts, of itself and of the follower in the adjacent
+/// lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tolerance {
+pub(in crate::driver) struct Tolerance {
     /// Accepted own braking behind a slower lead vehicle in the adjacent lane (m/s²).
-    pub(super) own_mps2: f64,
+    pub(in crate::driver) own_mps2: f64,
     /// Accepted braking of the follower in the adjacent lane (m/s²).
-    pub(super) follower_mps2: f64,
+    pub(in crate::driver) follower_mps2: f64,
     /// Time headway left to that follower (s).
-    pub(super) follower_headway_s: f64,
+    pub(in crate::driver) follower_headway_s: f64,
 }
 
 impl Tolerance {
@@ -46,15 +47,15 @@ impl Tolerance {
 
 /// The criterion by which a driver accepts an adjacent lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct GapAcceptance {
+pub(in crate::driver) struct GapAcceptance {
     /// Own speed (m/s).
-    pub(super) speed_mps: f64,
+    pub(in crate::driver) speed_mps: f64,
     /// Speed of the vehicle to overtake (m/s).
-    pub(super) overtaken_mps: f64,
+    pub(in crate::driver) overtaken_mps: f64,
     /// Own safe gap at the present speed (m).
-    pub(super) safe_gap_m: f64,
+    pub(in crate::driver) safe_gap_m: f64,
     /// Accepted braking.
-    pub(super) tolerance: Tolerance,
+    pub(in crate::driver) tolerance: Tolerance,
 }
 
 impl GapAcceptance {
@@ -64,7 +65,7 @@ impl GapAcceptance {
     }
 
     /// Returns true if the lane is free enough.
-    pub(super) fn is_free(&self, lane: &PerceivedLane) -> bool {
+    pub(in crate::driver) fn is_free(&self, lane: &PerceivedLane) -> bool {
         !lane.alongside
             && lane.lead.as_ref().is_none_or(|lead| self.accepts_lead(lead))
             && lane.follower.as_ref().is_none_or(|follower| self.accepts_follower(follower))

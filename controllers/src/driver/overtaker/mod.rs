@@ -28,7 +28,7 @@
 //! strongly as necessary, up to the limit of a human, and continues to steer. The gap that it tries
 //! to keep is its own safe gap, cc0 + cc1·v.
 
-mod acceptance;
+pub(super) mod acceptance;
 mod config;
 mod conflict;
 mod driver;

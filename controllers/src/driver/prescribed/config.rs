@@ -1,6 +1,6 @@
 //! Configuration of a prescribed driver.
 
-use closecall_traffic::{Check, ConfigError, Lane, Num, Parameters, Problem, Range, Side};
+use closecall_traffic::{Check, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -170,22 +170,30 @@ impl Prescribed {
     }
 
     /// Checks that a target lane exists for each lane change of a vehicle that starts in lane
-    /// `start` of `lanes` lanes.
+    /// `start` of `road`.
     ///
     /// # Errors
-    /// Returns a [`ConfigError`] that names the first lane change that would leave the road.
-    pub fn check_lanes(&self, start: Lane, lanes: u8) -> Result<(), ConfigError> {
-        let mut lane = start.0;
+    /// Returns a [`ConfigError`] that names the first lane change that would leave the road, or enter
+    /// its acceleration lane.
+    pub fn check_lanes(&self, start: Lane, road: &Road) -> Result<(), ConfigError> {
+        let mut lane = start;
         for (index, change) in self.lane_changes.iter().enumerate() {
-            let target = match change.to {
-                Side::Left => lane.checked_sub(1).filter(|lane| *lane >= 1),
-                Side::Right => lane.checked_add(1).filter(|lane| *lane <= lanes),
-            };
-            let rule = || format!("lane {lane} of {lanes} has no lane on that side, counted from 1 at the left");
-            let off_road = || ConfigError::new("to", Problem::Contradiction { other: "start", rule: rule() });
-            lane = target.ok_or_else(|| off_road().within_index(index).within("lane-changes"))?;
+            lane = road.lane_to_enter(lane, change.to).map_err(|reason| {
+                let problem = Problem::Contradiction { other: "start", rule: reason.to_string() };
+                ConfigError::new("to", problem).within_index(index).within("lane-changes")
+            })?;
         }
         Ok(())
+    }
+
+    /// Returns the time at which the first lane change begins, or `None` if the driver keeps its lane.
+    pub fn first_lane_change(&self) -> Option<Time> {
+        self.lane_changes.first().map(|change| change.at)
+    }
+
+    /// Returns the distance that a vehicle with the initial speed `start_mps` drives until a time (m).
+    pub fn distance_m(&self, start_mps: f64, until: Time) -> f64 {
+        self.speeds_from(start_mps).distance_m(until.s())
     }
 
     /// Returns the same driver with left and right exchanged.
@@ -203,6 +211,8 @@ impl Prescribed {
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::{AccelerationLane, Side};
+
     use super::*;
 
     fn pairs(points: &[[f64; 2]]) -> Option<Vec<[Num; 2]>> {
@@ -241,11 +251,19 @@ mod tests {
         let change = |at_s: f64, to| PrescribedLaneChangeConfig { at_s: at_s.into(), to, duration_s: 5.0.into() };
         let config = |lane_changes| PrescribedConfig { lane_changes, ..PrescribedConfig::speeds(&[[0.0, 30.0]]) };
         let there_and_back = config(vec![change(1.0, Side::Left), change(6.0, Side::Right)]).check(&none).unwrap();
-        assert_eq!(there_and_back.check_lanes(Lane(2), 2), Ok(()));
-        let error = there_and_back.check_lanes(Lane(1), 2).unwrap_err();
+        assert_eq!(there_and_back.check_lanes(Lane(2), &Road::straight(2)), Ok(()));
+        let error = there_and_back.check_lanes(Lane(1), &Road::straight(2)).unwrap_err();
         assert_eq!(error.path.to_string(), "lane-changes[0].to");
         let mirrored = there_and_back.mirrored();
-        assert!(mirrored.check_lanes(Lane(1), 2).is_ok() && mirrored.check_lanes(Lane(2), 2).is_err());
+        assert!(
+            mirrored.check_lanes(Lane(1), &Road::straight(2)).is_ok()
+                && mirrored.check_lanes(Lane(2), &Road::straight(2)).is_err()
+        );
+        let entry = AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };
+        let with_entry = Road::straight(3).with_acceleration_lane(entry);
+        assert!(there_and_back.check_lanes(Lane(2), &with_entry).is_ok());
+        let error = mirrored.check_lanes(Lane(2), &with_entry).unwrap_err();
+        assert!(error.to_string().contains("acceleration lane"), "{error}");
         let error = config(vec![change(1.0, Side::Left), change(5.9, Side::Left)]).check(&none).unwrap_err();
         assert_eq!(error.path.to_string(), "lane-changes[1].at-s");
         assert!(config(vec![change(f64::NAN, Side::Left)]).check(&none).is_err());

@@ -41,6 +41,14 @@ impl SpeedProfile {
         Self { points }
     }
 
+    /// Returns the distance driven from the start of the run until `until_s` (m).
+    pub(super) fn distance_m(&self, until_s: f64) -> f64 {
+        let inner_s = self.points.iter().map(|(time_s, _)| *time_s).filter(|time_s| *time_s > 0.0 && *time_s < until_s);
+        let times_s: Vec<f64> = std::iter::once(0.0).chain(inner_s).chain([until_s]).collect();
+        let stretch_m = |pair: &[f64]| 0.5 * (self.at(pair[0]).0 + self.at(pair[1]).0) * (pair[1] - pair[0]);
+        times_s.windows(2).map(stretch_m).sum()
+    }
+
     /// Returns the speed (m/s) and its slope (m/s²) at `time_s`.
     pub(super) fn at(&self, time_s: f64) -> (f64, f64) {
         let after = self.points.partition_point(|(time, _)| *time <= time_s);
@@ -65,6 +73,14 @@ mod tests {
         assert_eq!(profile.at(0.0), (30.0, 0.0));
         assert_eq!(profile.at(2.0), (25.0, -5.0));
         assert_eq!(profile.at(9.0), (20.0, 0.0));
+    }
+
+    #[test]
+    fn the_distance_is_the_integral_of_the_speed() {
+        let profile = SpeedProfile::new(vec![(1.0, 30.0), (3.0, 20.0)]);
+        for (until_s, distance_m) in [(0.0, 0.0), (0.5, 15.0), (2.0, 57.5), (3.0, 80.0), (5.0, 120.0)] {
+            assert!((profile.distance_m(until_s) - distance_m).abs() < 1e-9, "{until_s}");
+        }
     }
 
     #[test]

@@ -160,11 +160,12 @@ fn lane_id(lane: Lane) -> Identifier {
 fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<messages::Lane>, Vec<LaneBoundary>) {
     const TYPE_DRIVING: i32 = 2;
     let road = &scenario.road;
-    let line = |d_m: f64| -> Vec<Vector3d> {
+    let line = |d_m: &dyn Fn(f64) -> f64| -> Vec<Vector3d> {
         let count = ((end_m - start_m) / POINT_SPACING_M).ceil().max(1.0);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a road has some thousand points")]
         let points = (0..=count as u32).map(|index| {
-            let pose = road.plane_pose(start_m + (end_m - start_m) * f64::from(index) / count, d_m, 0.0);
+            let s_m = start_m + (end_m - start_m) * f64::from(index) / count;
+            let pose = road.plane_pose(s_m, d_m(s_m), 0.0);
             vector(pose.x_m, pose.y_m, 0.0)
         });
         points.collect()
@@ -179,7 +180,7 @@ fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<m
             classification: Some(LaneClassification {
                 r#type: Some(TYPE_DRIVING),
                 is_host_vehicle_lane: Some(host == Some(lane)),
-                centerline: line(road.lane_centre_m(lane)),
+                centerline: line(&|_| road.lane_centre_m(lane)),
                 centerline_is_driving_direction: Some(true),
                 left_adjacent_lane_id: beside(closecall_traffic::Side::Left),
                 right_adjacent_lane_id: beside(closecall_traffic::Side::Right),
@@ -191,7 +192,7 @@ fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<m
     });
     let boundaries = (0..=road.lanes()).map(|number| {
         let is_edge = number == 0 || number == road.lanes();
-        let points = line(-f64::from(number) * road.lane_width_m()).into_iter().map(|position| BoundaryPoint {
+        let points = line(&|s_m| road.boundary_at_m(number, s_m)).into_iter().map(|position| BoundaryPoint {
             position: Some(position),
             width: Some(MARKING_WIDTH_M),
             height: Some(0.0),

@@ -1,6 +1,6 @@
 //! A road strip: the road from above at one instant, in a frame that moves with the ego.
 
-use closecall_traffic::{Lane, Measured, VehicleState, maths};
+use closecall_traffic::{AccelerationLane, Lane, Measured, VehicleState, maths};
 
 use super::chart::tick_text;
 use super::colours::colour;
@@ -122,8 +122,11 @@ impl Strip<'_> {
             let stroke = Stroke { colour: MARKING, width: 1.0, dash: Some(DASH) };
             svg.line(self.at(ends[0], d_m), self.at(ends[1], d_m), stroke);
         }
-        for d_m in road_edges_m(self.film) {
-            svg.line(self.at(ends[0], d_m), self.at(ends[1], d_m), Stroke::solid(MARKING, 2.5));
+        for edge in [0, road.lanes()] {
+            for stretch_m in AccelerationLane::stretches_m(road.acceleration_lane(), ends) {
+                let [from, to] = stretch_m.map(|s_m| self.at(s_m, road.boundary_at_m(edge, s_m)));
+                svg.line(from, to, Stroke::solid(MARKING, 2.5));
+            }
         }
     }
 

@@ -216,6 +216,7 @@ pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, Config
         overtaking_side: Side::Left,
         guard_rails: false,
         roadside: closecall_traffic::RoadsideConfig::default(),
+        acceleration_lane: None,
     };
     config.check(&Parameters::default())
 }

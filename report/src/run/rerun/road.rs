@@ -1,6 +1,6 @@
 //! The road in the 3D scene: surface, lane markings, guard rails. It is written once per film.
 
-use closecall_traffic::{Lane, Road};
+use closecall_traffic::{AccelerationLane, Lane, Road, Side};
 use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordingError;
@@ -73,14 +73,25 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
 fn markings(road: &Road, [from_m, to_m]: [f64; 2]) -> Ribbons<'_> {
     let mut markings = Ribbons::new(road, MARKING_Z_M);
     let around = |d_m: f64, width_m: f64| [d_m - 0.5 * width_m, d_m + 0.5 * width_m];
-    for edge_m in [0.0, road.right_edge_m()] {
-        markings.add([from_m, to_m], around(edge_m, EDGE_WIDTH_M));
+    for edge in [0, road.lanes()] {
+        for along_m in AccelerationLane::stretches_m(road.acceleration_lane(), [from_m, to_m]) {
+            markings.add_along(along_m, |s_m| around(road.boundary_at_m(edge, s_m), EDGE_WIDTH_M));
+        }
     }
     for lane in 1..road.lanes() {
         let line_m = road.lane_centre_m(Lane(lane)) - 0.5 * road.lane_width_m();
         for dash in multiples(DASH_PERIOD_M, [from_m, to_m]) {
             markings.add([dash, dash + DASH_M], around(line_m, DASH_WIDTH_M));
         }
+    }
+    // No vehicle leaves the ramp before the acceleration lane begins.
+    if let Some(lane) = road.acceleration_lane().filter(|lane| from_m < lane.from_m) {
+        let inner = match road.overtaking_side() {
+            Side::Left => road.lanes() - 1,
+            Side::Right => 1,
+        };
+        let line_m = road.boundary_at_m(inner, from_m);
+        markings.add([from_m, lane.from_m.min(to_m)], around(line_m, DASH_WIDTH_M));
     }
     markings
 }
@@ -145,9 +156,16 @@ impl<'a> Ribbons<'a> {
     }
 
     /// Adds a ribbon between two positions along the road and two positions across it.
-    fn add(&mut self, along_m: [f64; 2], [right_m, left_m]: [f64; 2]) {
+    fn add(&mut self, along_m: [f64; 2], across_m: [f64; 2]) {
+        self.add_along(along_m, |_| across_m);
+    }
+
+    /// Adds a ribbon between two positions along the road. `across_m` returns its right and its left
+    /// side at a position along the road.
+    fn add_along(&mut self, along_m: [f64; 2], across_m: impl Fn(f64) -> [f64; 2]) {
         let mut previous = None;
         for s_m in piece_ends(self.road, along_m) {
+            let [right_m, left_m] = across_m(s_m);
             #[expect(clippy::cast_possible_truncation, reason = "a road has far fewer than 2^32 vertices")]
             let here = self.vertices.len() as u32;
             self.vertices.push(point(self.road, s_m, right_m, self.z_m));
