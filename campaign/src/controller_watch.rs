@@ -18,7 +18,7 @@ use std::time::{Duration, Instant, SystemTime};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::ExecSettings;
 
-use crate::fingerprint::{Fingerprint, named_files};
+use crate::fingerprint::{Fingerprint, command_settings, named_files};
 use crate::manifest::{Manifest, file_hash};
 
 /// Shortest time between two looks at the files.
@@ -72,7 +72,10 @@ impl ControllerWatch {
             paths.extend(named);
         }
         for program in manifest.programs() {
-            let named = command_files(&ExecSettings::from(&program), folder);
+            let named = match command_settings(&program) {
+                Some(settings) => command_files(&settings, folder),
+                None => vec![in_folder(folder, Path::new(program.command))],
+            };
             paths.extend(imports(&named, folder));
             paths.extend(named);
         }

@@ -247,6 +247,6 @@ fn line(message: &impl serde::Serialize) -> Vec<u8> {
 /// Returns the failure of a sample whose process has ended. Its message does not depend on the
 /// samples before.
 fn failure(error: &ExecError) -> SampleFailure {
-    let message = error.end_of_isolated().unwrap_or_else(|| format!("the controller failed: {error}"));
+    let message = error.end_of_isolated("the controller").unwrap_or_else(|| format!("the controller failed: {error}"));
     SampleFailure { kind: KIND.to_owned(), message }
 }

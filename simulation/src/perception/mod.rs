@@ -1,4 +1,5 @@
-//! A perception of the user's own as a separate process, written in any language: `sensors.perception = "exec:COMMAND"`.
+//! A perception of the user's own as a separate process, written in any language: `sensors.perception = "exec:COMMAND"`. A shared
+//! library, `"lib:PATH"`, is such a process, too: `perception/library` loads it.
 //!
 //! ```text
 //!  closecall ── hello, one line per control step with scans ──▶ standard input  ┐
@@ -24,8 +25,10 @@
 //! `docs/reference/perception.md` has every key.
 
 mod answer;
+mod library;
 mod process;
 mod question;
 
+pub use library::{probe as probe_library, serve as serve_library};
 pub(crate) use process::PerceptionProcess;
 pub use process::{identify_program, try_program};
