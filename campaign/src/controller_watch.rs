@@ -15,6 +15,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
+use closecall_sensors::external::ProgramKind;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::ExecSettings;
 
@@ -72,9 +73,10 @@ impl ControllerWatch {
             paths.extend(named);
         }
         for program in manifest.programs() {
-            let named = match command_settings(&program) {
-                Some(settings) => command_files(&settings, folder),
-                None => vec![in_folder(folder, Path::new(program.command))],
+            let named = match program.kind {
+                ProgramKind::Exec => command_files(&command_settings(&program), folder),
+                ProgramKind::Lib => vec![in_folder(folder, Path::new(program.command))],
+                ProgramKind::Hosted => continue,
             };
             paths.extend(imports(&named, folder));
             paths.extend(named);

@@ -152,19 +152,21 @@ fn hashes(files: Vec<(String, PathBuf)>) -> Vec<FileHash> {
 
 /// Returns the files that a perception program names, each as it is named and with its path: those of its command, or its library.
 pub fn program_files(program: &ProgramSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
-    match command_settings(program) {
-        Some(settings) => named_files(&settings, folder),
-        None => {
+    match program.kind {
+        ProgramKind::Exec => named_files(&command_settings(program), folder),
+        ProgramKind::Lib => {
             let path = folder.map_or_else(|| PathBuf::from(program.command), |folder| folder.join(program.command));
             vec![(program.command.to_owned(), path)]
         }
+        // Its version stands in its name.
+        ProgramKind::Hosted => Vec::new(),
     }
 }
 
-/// Returns the settings of the process of a perception program that is a command; `None` for a library.
-pub(crate) fn command_settings(program: &ProgramSettings) -> Option<ExecSettings> {
-    let ProgramSettings { kind, command, timeout_ms, memory_mib, .. } = *program;
-    (kind == ProgramKind::Exec).then(|| ExecSettings { command: command.to_owned(), timeout_ms, memory_mib })
+/// Returns the settings of the process of a perception program that is a command.
+pub(crate) fn command_settings(program: &ProgramSettings) -> ExecSettings {
+    let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
+    ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
 }
 
 /// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows

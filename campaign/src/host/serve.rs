@@ -16,7 +16,7 @@ use closecall_sensors::camera::{Backend, Classifier};
 use closecall_sensors::set_inference_backend;
 use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::{Probe, UNPACKED};
-use closecall_simulation::perception::{probe_library, serve_library};
+use closecall_simulation::perception::{hosted, probe_library, serve_library};
 use closecall_simulation::{Arm, SampleError};
 
 use super::{Answer, CHANGED, Question, Task, UNREADABLE, task_identity};
@@ -143,7 +143,11 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
         Err(reason) => return refuse(answers, lines.next(), (kind, reason)),
     };
     let name = controller.name().to_owned();
+    if let Some((name, words)) = task.hosted_perception {
+        hosted::register(&name, words);
+    }
     let file = ScenarioFile::parse(&task.path, &task.text, &[]).map_err(|error| error.to_string())?;
+    let file = file.with_program_in(task.program_folder.as_deref().map(Path::new));
     let arms = vec![Arm { controller, sensors: task.sensors }];
     let work = Work { file, sampling: task.sampling, arms, checks: task.checks, retry_crashed: 0 };
     let is_answered = Arc::new(AtomicBool::new(true));

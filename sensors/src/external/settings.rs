@@ -16,17 +16,21 @@ pub enum ProgramKind {
     Exec,
     /// A shared library: `lib:PATH`.
     Lib,
+    /// An object of the Python program that runs Closecall: `python:NAME`. A file cannot name one
+    /// that runs elsewhere.
+    Hosted,
 }
 
 impl ProgramKind {
     /// All kinds.
-    pub const ALL: [Self; 2] = [Self::Exec, Self::Lib];
+    pub const ALL: [Self; 3] = [Self::Exec, Self::Lib, Self::Hosted];
 
     /// Returns the word before the colon.
     pub const fn prefix(self) -> &'static str {
         match self {
             Self::Exec => "exec",
             Self::Lib => "lib",
+            Self::Hosted => "python",
         }
     }
 
@@ -70,7 +74,8 @@ pub struct ImageSettings {
 pub struct ProgramSettings {
     /// What the program is.
     pub kind: ProgramKind,
-    /// The command with its arguments, with the quotes of a shell, or the path of the library.
+    /// The command with its arguments, with the quotes of a shell, the path of the library, or the
+    /// name of the object with its version.
     pub command: &'static str,
     /// Time limit of each answer (ms).
     pub timeout_ms: u64,
@@ -154,6 +159,8 @@ mod tests {
         let library = check("lib:./my perception.so", 250, 64).unwrap().unwrap();
         assert_eq!((library.kind, library.command), (ProgramKind::Lib, "./my perception.so"));
         assert_eq!(library.name(), "lib:./my perception.so");
+        let object = check("python:Mine@1a2b", 250, 64).unwrap().unwrap();
+        assert_eq!((object.kind, object.name()), (ProgramKind::Hosted, "python:Mine@1a2b".to_owned()));
         for wrong in ["", "python3 mine.py", "exec:", "exec:  ", "lib:", "fmu:./mine.fmu", "builtin"] {
             let error = check(wrong, 1_000, 1_024).unwrap_err();
             assert!(

@@ -31,7 +31,7 @@ const OLDEST_NS: i64 = 200_000_000;
 /// Height of the highest point of a detection that states none (m): that of a car.
 pub(super) const USUAL_TOP_M: f64 = 1.5;
 
-/// The key under which the process of a library says why it has no answer.
+/// The key under which the process of a library or of an object says why it has no answer.
 pub(super) const ERROR_KEY: &str = "error";
 
 /// What a process answers with.
@@ -63,12 +63,12 @@ pub(super) enum AnswerError {
 }
 
 impl AnswerError {
-    /// Returns the message about a library. Its line is that of the process around it.
-    pub(super) fn of_library(&self) -> String {
+    /// Returns the message about a library or an object. Its line is that of the process around it.
+    pub(super) fn without_line(&self, who: &str) -> String {
         match self {
             // A number that is not finite is written as a word.
             Self::Field { field, needed, found, .. } => {
-                format!("the library answered: `{field}` must be {needed}, it is {}", found.trim_matches('"'))
+                format!("{who} answered: `{field}` must be {needed}, it is {}", found.trim_matches('"'))
             }
             Self::NotJson { .. } => self.to_string(),
         }
@@ -105,7 +105,7 @@ pub(super) fn kind(line: &[u8]) -> Result<Kind, AnswerError> {
     }
 }
 
-/// Returns why the process of a library has no answer, if it says so.
+/// Returns why the process of a library or of an object has no answer, if it says so.
 pub(super) fn stated_error(line: &[u8]) -> Option<String> {
     object(line).ok()?.get(ERROR_KEY)?.as_str().map(str::to_owned)
 }
@@ -440,7 +440,7 @@ mod tests {
     fn a_message_about_a_library_has_the_field_and_the_number_without_the_line() {
         let changed = TRACK.replacen("[0,0.01,0,0]", "[0,\"NaN\",0,0]", 1).replace('\n', "");
         let line = format!("{{\"time_ns\":80000000,\"tracks\":[{changed}]}}");
-        let error = parse(line.as_bytes(), (Kind::Tracks, TIME), 3).unwrap().unwrap_err().of_library();
+        let error = parse(line.as_bytes(), (Kind::Tracks, TIME), 3).unwrap().unwrap_err().without_line("the library");
         assert!(
             error.starts_with("the library answered: `tracks[0].covariance[1][1]` must be a variance: "),
             "{error}"

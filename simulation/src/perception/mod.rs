@@ -1,5 +1,5 @@
 //! A perception of the user's own as a separate process, written in any language: `sensors.perception = "exec:COMMAND"`. A shared
-//! library, `"lib:PATH"`, is such a process, too: `perception/library` loads it.
+//! library, `"lib:PATH"`, and an object of a Python program are such processes, too: see `perception/library` and [`hosted`].
 //!
 //! ```text
 //!  closecall ── hello, one line per control step with scans ──▶ standard input  ┐
@@ -25,6 +25,7 @@
 //! `docs/reference/perception.md` has every key.
 
 mod answer;
+pub mod hosted;
 mod library;
 mod process;
 mod question;

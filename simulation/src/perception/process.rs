@@ -1,4 +1,5 @@
-//! A process as the perception of the closed loop: a command, or a process of this program that has loaded a library.
+//! A process as the perception of the closed loop: a command, a process of this program that has loaded a library, or a process with an
+//! object of a Python program.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -12,12 +13,13 @@ use closecall_sensors::external::{
 use closecall_traffic::{CONTROL_STEP, Time};
 
 use super::answer::{self, AnswerError, Kind};
+use super::hosted;
 use super::question::{self, Setup};
 use crate::controller::exec::{Child, ExecError, ExecSettings, Identity, START_TIMEOUT, check_hello};
 use crate::controller::native::{self, LOAD_TIMEOUT, NativeError, Probe};
 use crate::run::ComputingTime;
 
-/// What ends the process in which a library runs.
+/// What ends the process in which a library or an object runs.
 const WHO: &str = "the perception";
 
 /// Why a process did not give a valid answer.
@@ -32,7 +34,7 @@ enum ProgramError {
     /// The process computes for longer than from a scan to the next.
     #[error("the process {0}")]
     Slow(String),
-    /// A library says why it has no answer.
+    /// A library or an object says why it has no answer, or cannot be run.
     #[error("{0}")]
     Stated(String),
 }
@@ -42,12 +44,13 @@ impl ProgramError {
         matches!(self, Self::Process(error) if error.is_late())
     }
 
-    /// Returns the message. A library is not the process in which it runs.
+    /// Returns the message. A library or an object is not the process in which it runs.
     fn message(&self, kind: ProgramKind) -> String {
         match (kind, self) {
-            (ProgramKind::Lib, Self::Process(error)) => error.end_of_isolated(WHO).unwrap_or_else(|| error.to_string()),
-            (ProgramKind::Lib, Self::Answer(error)) => error.of_library(),
-            (ProgramKind::Lib, Self::Slow(_) | Self::Stated(_)) | (ProgramKind::Exec, _) => self.to_string(),
+            (ProgramKind::Exec, _) | (_, Self::Slow(_) | Self::Stated(_)) => self.to_string(),
+            (_, Self::Process(error)) => error.end_of_isolated(WHO).unwrap_or_else(|| error.to_string()),
+            (ProgramKind::Lib, Self::Answer(error)) => error.without_line("the library"),
+            (ProgramKind::Hosted, Self::Answer(error)) => error.without_line(WHO),
         }
     }
 }
@@ -81,7 +84,7 @@ impl PerceptionProcess {
         let begun = Instant::now();
         let answered = child.request(line, limit)?;
         let spent = begun.elapsed();
-        if self.program.kind == ProgramKind::Lib
+        if self.program.kind != ProgramKind::Exec
             && let Some(reason) = answer::stated_error(&answered)
         {
             child.condemn();
@@ -139,8 +142,9 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
 pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
     let fail = |reason: String| NativeError::StartProgram { program: program.name(), reason };
     let folder = program.folder.map(Path::new);
-    if program.kind == ProgramKind::Exec {
-        return Child::try_start(&process_settings(program), folder).map_err(|error| fail(error.to_string()));
+    if program.kind != ProgramKind::Lib {
+        let settings = process_settings(program).map_err(|error| fail(error.to_string()))?;
+        return Child::try_start(&settings, folder).map_err(|error| fail(error.to_string()));
     }
     let crash = |error: ExecError| fail(error.end_of_isolated(WHO).unwrap_or_else(|| error.to_string()));
     let mut child = Child::start(&own_process(program, "probe-perception"), folder).map_err(crash)?;
@@ -160,17 +164,25 @@ pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
 }
 
 /// Returns the settings of the process of a program.
-fn process_settings(program: &ProgramSettings) -> ExecSettings {
+fn process_settings(program: &ProgramSettings) -> Result<ExecSettings, ProgramError> {
     let ProgramSettings { kind, command, timeout_ms, memory_mib, .. } = *program;
     match kind {
-        ProgramKind::Exec => ExecSettings { command: command.to_owned(), timeout_ms, memory_mib },
-        ProgramKind::Lib => own_process(program, "perceive"),
+        ProgramKind::Exec => Ok(ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }),
+        ProgramKind::Lib => Ok(own_process(program, "perceive")),
+        ProgramKind::Hosted => match hosted::words(&program.name()) {
+            Some(words) => Ok(process_of(program, &words)),
+            None => Err(ProgramError::Stated(hosted::missing())),
+        },
     }
 }
 
 /// Returns the settings of a process of this program that does something with a library.
 fn own_process(program: &ProgramSettings, action: &str) -> ExecSettings {
-    let words = native::command(&[action, program.command]);
+    process_of(program, &native::command(&[action, program.command]))
+}
+
+/// Returns the settings of the process that these words start, under the limits of the program.
+fn process_of(program: &ProgramSettings, words: &[String]) -> ExecSettings {
     // A word with a NUL character, which cannot be quoted, names no file.
     let command = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default();
     ExecSettings { command, timeout_ms: program.timeout_ms, memory_mib: program.memory_mib }
@@ -178,7 +190,7 @@ fn own_process(program: &ProgramSettings, action: &str) -> ExecSettings {
 
 /// Starts a program, and greets it.
 fn greet(program: &ProgramSettings, setup: &Setup<'_>) -> Result<(Child, Identity, Kind), ProgramError> {
-    let settings = process_settings(program);
+    let settings = process_settings(program)?;
     let mut child = Child::start(&settings, program.folder.map(Path::new))?;
     let limit = START_TIMEOUT.max(Duration::from_millis(settings.timeout_ms));
     let hello = child.request(setup.hello(), limit)?;
