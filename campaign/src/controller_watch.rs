@@ -15,10 +15,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
+use closecall_sensors::external::ProgramKind;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::ExecSettings;
 
-use crate::fingerprint::{Fingerprint, named_files};
+use crate::fingerprint::{Fingerprint, command_settings, named_files};
 use crate::manifest::{Manifest, file_hash};
 
 /// Shortest time between two looks at the files.
@@ -72,7 +73,11 @@ impl ControllerWatch {
             paths.extend(named);
         }
         for program in manifest.programs() {
-            let named = command_files(&ExecSettings::from(&program), folder);
+            let named = match program.kind {
+                ProgramKind::Exec => command_files(&command_settings(&program), folder),
+                ProgramKind::Lib => vec![in_folder(folder, Path::new(program.command))],
+                ProgramKind::Hosted => continue,
+            };
             paths.extend(imports(&named, folder));
             paths.extend(named);
         }

@@ -42,8 +42,9 @@ impl From<&ScenarioError> for FailureKind {
 impl From<&NativeError> for FailureKind {
     fn from(error: &NativeError) -> Self {
         match error {
-            NativeError::Refused { is_io: true, .. } => Self::Io,
+            NativeError::Refused { is_io: true, .. } | NativeError::RefusedProgram { is_io: true, .. } => Self::Io,
             NativeError::Refused { .. }
+            | NativeError::RefusedProgram { .. }
             | NativeError::Crash { .. }
             | NativeError::Start { .. }
             | NativeError::StartProgram { .. } => Self::InvalidInput,

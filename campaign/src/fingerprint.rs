@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_controllers::CheckedDriver;
 use closecall_scenarios::Scenario;
-use closecall_sensors::external::ProgramSettings;
+use closecall_sensors::external::{ProgramKind, ProgramSettings};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{ExecSettings, Identity, identify};
 use closecall_simulation::controller::native::NativeSettings;
@@ -59,7 +59,7 @@ impl Fingerprint {
             CheckedDriver::Human(_) => None,
         });
         let (identity, open_files) = greeted.unwrap_or_default();
-        Self { command: settings.command.clone(), files: hashed(settings, folder), identity, open_files }
+        Self { command: settings.command.clone(), files: hashes(named_files(settings, folder)), identity, open_files }
     }
 
     /// Returns the files that the process has mapped or opened after its greeting.
@@ -79,12 +79,11 @@ impl Fingerprint {
     /// Returns the fingerprint of a perception program. It is started once and greeted as in a run of `scenario`. One that cannot be
     /// greeted has no identity.
     pub fn of_program(program: &ProgramSettings, scenario: Option<&Scenario>) -> Self {
-        let settings = ExecSettings::from(program);
         let stated = scenario.and_then(|scenario| identify_program(program, scenario)).unwrap_or_default();
         let (identity, open_files) = stated;
         Self {
             command: format!("{PERCEPTION}{}", program.name()),
-            files: hashed(&settings, program.folder.map(Path::new)),
+            files: hashes(program_files(program, program.folder.map(Path::new))),
             identity,
             open_files,
         }
@@ -141,14 +140,33 @@ pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<St
     there.iter().filter_map(|earlier| Some(earlier.differences(same(earlier)?))).flatten().collect()
 }
 
-/// Returns the hashes of the files that the command names.
-fn hashed(settings: &ExecSettings, folder: Option<&Path>) -> Vec<FileHash> {
+/// Returns the hashes of files, each given as it is named and with its path.
+fn hashes(files: Vec<(String, PathBuf)>) -> Vec<FileHash> {
     let hash = |(name, path): (String, PathBuf)| {
         // A file that cannot be read has no hash: it differs from one that can.
         let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
         FileHash { name, blake3 }
     };
-    named_files(settings, folder).into_iter().map(hash).collect()
+    files.into_iter().map(hash).collect()
+}
+
+/// Returns the files that a perception program names, each as it is named and with its path: those of its command, or its library.
+pub fn program_files(program: &ProgramSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
+    match program.kind {
+        ProgramKind::Exec => named_files(&command_settings(program), folder),
+        ProgramKind::Lib => {
+            let path = folder.map_or_else(|| PathBuf::from(program.command), |folder| folder.join(program.command));
+            vec![(program.command.to_owned(), path)]
+        }
+        // Its version stands in its name.
+        ProgramKind::Hosted => Vec::new(),
+    }
+}
+
+/// Returns the settings of the process of a perception program that is a command.
+pub(crate) fn command_settings(program: &ProgramSettings) -> ExecSettings {
+    let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
+    ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
 }
 
 /// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows

@@ -5,15 +5,13 @@ use std::path::{Path, PathBuf};
 use closecall_recorded::trajectory_data::input_files;
 use closecall_scenarios::ScenarioFile;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::controller::exec::ExecSettings;
 
-use crate::fingerprint::named_files;
+use crate::fingerprint::{named_files, program_files};
 
 /// Returns the files from which a scenario was read, and those that its perception program names.
 pub fn of_scenario(file: &ScenarioFile) -> Vec<PathBuf> {
     let recorded = file.trajectory_files().iter().flat_map(|path| input_files(path));
-    let program =
-        file.program().map(|program| named_files(&ExecSettings::from(&program), program.folder.map(Path::new)));
+    let program = file.program().map(|program| program_files(&program, program.folder.map(Path::new)));
     let of_program = program.into_iter().flatten().map(|(_, path)| path);
     std::iter::once(file.path().to_owned()).chain(recorded).chain(of_program).collect()
 }

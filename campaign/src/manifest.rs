@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
-use closecall_sensors::external::ProgramSettings;
+use closecall_sensors::external::{ProgramKind, ProgramSettings};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_traffic::input;
@@ -297,7 +297,10 @@ impl Manifest {
     /// Returns the commands, libraries and FMUs that the arms and the sensors run.
     pub fn foreign_code(&self) -> Vec<String> {
         let arms = self.arms.iter().filter(|arm| arm.exec().is_some() || arm.native().is_some());
-        arms.map(ToString::to_string).chain(self.programs().iter().map(ProgramSettings::name)).collect()
+        let programs = self.programs();
+        // An object of a Python program is not in the folder.
+        let named = programs.iter().filter(|program| program.kind != ProgramKind::Hosted).map(ProgramSettings::name);
+        arms.map(ToString::to_string).chain(named).collect()
     }
 
     /// Returns the arms, the baseline first.

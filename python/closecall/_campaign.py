@@ -20,8 +20,10 @@ from . import _host, _native
 from ._command import call
 from ._controller import ControllerLike, registered
 from ._errors import UsageError
+from ._perceive import perceiving
 from ._run import SensorsLike
 from ._scenario import Scenario, whole
+from .perception import PerceptionLike
 
 ScenarioLike = Scenario | str | os.PathLike[str]
 
@@ -154,6 +156,7 @@ def campaign(
     gate: Sequence[str] = (),
     progress: bool | Callable[[int, int], Any] = False,
     isolate: bool = False,
+    perception: PerceptionLike | None = None,
     **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
     """Runs many samples of scenarios, and judges the result, as ``closecall campaign`` does.
@@ -171,6 +174,10 @@ def campaign(
     ``isolate=True`` runs objects in worker processes, one for each job: a crash, a step that takes longer than
     ``controller_timeout_ms`` (1000) and a process that needs more than ``controller_memory_mib`` (1024) cost the sample only, too, and
     several jobs use several cores. It needs ``cloudpickle``.
+
+    ``perception`` takes the place of the built-in chain behind the rear LiDARs in mode ``full``: see :mod:`closecall.perception`. An object
+    runs in a process of its own for each sample, under the limits ``sensors.perception-timeout-ms`` and ``sensors.perception-memory-mib`` of
+    the scenario, and needs ``cloudpickle``. What it does wrong costs its sample.
 
     Ctrl-C raises ``KeyboardInterrupt`` after the samples that are running, and a second one at once. With ``out``, ``resume=True`` goes on from there.
     """
@@ -202,10 +209,17 @@ def campaign(
     limits = _limits(options) if isolate or is_remote else None
     if limits is None and set(LIMITS) & set(options) and not any(isinstance(one, str) and ":" in one for one in chosen):
         raise UsageError("`controller_timeout_ms` and `controller_memory_mib` limit processes: add `isolate=True`, or name one")
+    if is_remote and perception is not None and not isinstance(perception, str):
+        raise UsageError("perception: an object runs on this machine only; on a cluster, name a command or a library")
     timeout_s = options.get("sample_timeout_s")
     # What is no number is refused below.
     limit_s = timeout_s if isinstance(timeout_s, (int, float)) else _native.SAMPLE_TIMEOUT_S
-    with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
+    with (
+        registered(chosen, limits, is_remote, limit_s) as names,
+        perceiving(perception) as of_perception,
+        _reporter(progress) as report,
+    ):
+        settings = [*settings, *of_perception]
         if out is None and resume:
             raise UsageError("resume: name the folder of the campaign with `out`")
         # A selection of no recordings needs no folder. The campaign refuses a text that is no selection.

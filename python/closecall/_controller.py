@@ -56,7 +56,7 @@ def native(controller: ControllerLike) -> str | _native.PythonController:
     """Returns the name, or the native controller that creates an object for each sample."""
     if isinstance(controller, str):
         return controller
-    return _native.PythonController(_name(controller), factory(controller))
+    return _native.PythonController(hosted_name(controller), factory(controller))
 
 
 def factory(controller: ControllerLike) -> Callable[[], Controller]:
@@ -72,8 +72,8 @@ def factory(controller: ControllerLike) -> Callable[[], Controller]:
     )
 
 
-def _name(controller: Any) -> str:
-    """Returns ``python:NAME@VERSION``, in which the version identifies the code and the state of the controller."""
+def hosted_name(controller: Any) -> str:
+    """Returns ``python:NAME@VERSION``, in which the version identifies the code and the state of a controller or a perception."""
     own = controller if isinstance(controller, (type, types.FunctionType)) else type(controller)
     name = own.__qualname__.rpartition(".<locals>.")[2]
     word = "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name)
@@ -247,7 +247,7 @@ def registered(
     With ``limits``, the samples of objects run in worker processes that keep to them: of this program, or of a cluster. Without,
     steps end that hang for longer than ``timeout_s``, the time limit of a sample.
     """
-    names = [one if isinstance(one, str) else _name(one) for one in controllers]
+    names = [one if isinstance(one, str) else hosted_name(one) for one in controllers]
     objects = {name: one for name, one in zip(names, controllers) if not isinstance(one, str)}
     own: list[_native.PythonController] = []
     process: tuple[list[str], int, int] | None = None

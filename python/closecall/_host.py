@@ -38,7 +38,7 @@ class Limits(NamedTuple):
 
 
 class Parcel(NamedTuple):
-    """Controllers for other processes: their names, the library that reads them, how it reads them, and their limits."""
+    """Controllers or a perception for other processes: their names, the library that reads them, how it reads them, and their limits."""
 
     names: list[str]
     library: str
@@ -46,8 +46,11 @@ class Parcel(NamedTuple):
     limits: Limits
 
     @contextmanager
-    def file(self) -> Iterator[list[str]]:
-        """Writes a file, for as long as the context lasts, and returns the words that start a worker process with it."""
+    def file(self, start: str = START) -> Iterator[list[str]]:
+        """Writes a file, for as long as the context lasts, and returns the words that start a worker process with it.
+
+        ``start`` is the code with which the process begins.
+        """
         content = pickle.dumps((sys.path, self.names, self.library, self.pickled))
         with ExitStack() as ends:
             if sys.platform == "linux":
@@ -58,25 +61,28 @@ class Parcel(NamedTuple):
             else:
                 file = Path(ends.enter_context(tempfile.TemporaryDirectory(prefix="closecall-")), "controllers.pickle")
             file.write_bytes(content)
-            yield [sys.executable, "-c", START, str(file)]
+            yield [sys.executable, "-c", start, str(file)]
 
 
-def pickle_library() -> str:
-    """Returns the name of the library that pickles code by value."""
+def pickle_library(who: str = "isolate=True") -> str:
+    """Returns the name of the library that pickles code by value. ``who`` needs it."""
     for name in ("cloudpickle", "ray.cloudpickle"):
         try:
             if importlib.util.find_spec(name) is not None:
                 return name
         except ImportError:
             continue
-    raise UsageError('isolate=True needs cloudpickle: pip install "closecall[isolate]"')
+    raise UsageError(f'{who} needs cloudpickle: pip install "closecall[isolate]"')
 
 
-def parcel(controllers: dict[str, Any], limits: Limits) -> Parcel:
-    """Pickles controllers with the code of all modules that are not installed, and with their source text."""
+def parcel(controllers: dict[str, Any], limits: Limits, what: str = "a controller", who: str = "isolate=True") -> Parcel:
+    """Pickles controllers with the code of all modules that are not installed, and with their source text.
+
+    ``what`` they are, and ``who`` needs a library to pickle them, stand in messages.
+    """
     if not controllers:
         return Parcel([], "", b"", limits)
-    library = pickle_library()
+    library = pickle_library(who)
     cloudpickle = importlib.import_module(library)
     own = [module for module in list(sys.modules.values()) if _is_own(module)]
     for module in own:
@@ -87,7 +93,7 @@ def parcel(controllers: dict[str, Any], limits: Limits) -> Parcel:
         return Parcel(list(controllers), library, cloudpickle.dumps((controllers, sources)), limits)
     except Exception as error:
         raise InputError(
-            f"a controller cannot be given to another process, since it cannot be pickled: {error}", exit_code=3
+            f"{what} cannot be given to another process, since it cannot be pickled: {error}", exit_code=3
         ) from error
     finally:
         for module in own:
@@ -96,6 +102,17 @@ def parcel(controllers: dict[str, Any], limits: Limits) -> Parcel:
 
 def main() -> int:
     """Serves samples with the controllers of the file that the first argument names."""
+    prepare()
+    file, *words = sys.argv[1:]
+    kept = _load(file)
+    sys.argv[:] = [""]
+    code = _native.main(["closecall", *words])
+    del kept
+    return code
+
+
+def prepare() -> None:
+    """Prepares a process that a program of Closecall has started."""
     # The process lives as long as its standard input: Ctrl-C is for the program that has started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The message of a crash has the lines of Python, and no addresses, which would differ each time.
@@ -103,12 +120,22 @@ def main() -> int:
         faulthandler.enable(all_threads=False, c_stack=False)  # type: ignore[call-arg,unused-ignore]
     else:
         faulthandler.enable(all_threads=False)
-    file, *words = sys.argv[1:]
-    kept = _load(file)
-    sys.argv[:] = [""]
-    code = _native.main(["closecall", *words])
-    del kept
-    return code
+
+
+def unpacked(file: str) -> dict[str, Any]:
+    """Returns the objects of a file, by their names. Whatever their code raises is raised."""
+    # The file was written by the process that has started this one.
+    path, _, library, pickled = pickle.loads(Path(file).read_bytes())
+    sys.path[:] = path
+    objects, sources = importlib.import_module(library).loads(pickled)
+    _remember(sources)
+    return dict(objects)
+
+
+def _remember(sources: dict[str, list[str]]) -> None:
+    """Keeps the source text of files, so that a traceback quotes their lines as in the process that has them."""
+    for name, lines in sources.items():
+        linecache.cache[name] = (sum(map(len, lines)), None, lines, name)
 
 
 def _load(file: str) -> list[_native.PythonController]:
@@ -125,9 +152,7 @@ def _load(file: str) -> list[_native.PythonController]:
     except BaseException as error:
         reason = f"a controller cannot be read there: {type(error).__name__}: {error}"
     else:
-        for name, lines in sources.items():
-            # A traceback quotes the lines as it does in the process that has them.
-            linecache.cache[name] = (sum(map(len, lines)), None, lines, name)
+        _remember(sources)
         made = [_native.PythonController(name, factory(one)) for name, one in controllers.items()]
         for controller in made:
             controller.register()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from . import _native
@@ -87,6 +87,9 @@ def whole(name: str, value: int) -> int:
     return number
 
 
-def loaded(scenario: Scenario | str | os.PathLike[str]) -> Scenario:
-    """Returns the scenario, which is read if it is a path or a name."""
-    return scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+def loaded(scenario: Scenario | str | os.PathLike[str], settings: Sequence[str] = ()) -> Scenario:
+    """Returns the scenario, which is read if it is a path or a name, or if it is changed by further settings."""
+    read = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+    if not settings:
+        return read
+    return Scenario(_native.Scenario.load(read._native.source, [*read._native.settings, *settings]))

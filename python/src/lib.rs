@@ -9,6 +9,7 @@
 //! | `remote` | campaigns whose samples run on a cluster |
 //! | `run` | one run, with its trace and its figure |
 //! | `controller` | controllers that are Python objects |
+//! | `perception` | perceptions that are Python objects |
 //! | `episode` | runs that Python steps |
 //! | `table` | tables that other libraries read without copying (Arrow) |
 //! | `error` | the exceptions |
@@ -18,6 +19,7 @@ mod controller;
 mod episode;
 mod error;
 mod observation;
+mod perception;
 mod remote;
 mod run;
 mod scenario;
@@ -37,6 +39,8 @@ mod _native {
     const ODOMETRY_KEYS: [&str; 18] = super::observation::ODOMETRY_KEYS;
     #[pymodule_export]
     const TRACK_KEYS: [&str; 19] = super::observation::TRACK_KEYS;
+    #[pymodule_export]
+    use super::perception::{register_perception, unregister_perception};
     #[pymodule_export]
     use super::remote::{BlockRunner, set_engine, version};
     #[pymodule_export]

@@ -17,6 +17,7 @@ use closecall_scenarios::Scenario as Concrete;
 use closecall_scenarios::outcome::Outcome;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::perception::try_program;
 use closecall_simulation::trajectories::TraceRecorder;
 use closecall_simulation::{Arm, ControllerFactory, Observer, RunEvent, RunKey, SampleError, SettlingView, StepView};
 use closecall_traffic::Time;
@@ -24,7 +25,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::controller::PythonController;
-use crate::error::{exception, sample_exception, usage_exception};
+use crate::error::{exception, sample_exception, scenario_exception, usage_exception};
 use crate::scenario::Scenario;
 use crate::table::Table;
 
@@ -141,6 +142,11 @@ pub(crate) fn run(
     let native = factory.isolated().and_then(|isolated| Some(isolated.native()?.settings().clone()));
     let arm = Arm { controller: factory, sensors: sensor_mode(py, sensors)? };
     let concrete = scenario.get().concrete(seed, sample).map_err(|error| sample_exception(py, sample, &error))?;
+    if let Some(program) = concrete.sensors.program() {
+        let checked = arm.sensors.map_or(Ok(()), |mode| scenario.get().check_in(mode));
+        checked.map_err(|error| scenario_exception(py, &error))?;
+        py.detach(|| try_program(&program)).map_err(|error| exception(py, &error.into()))?;
+    }
     if let Some(native) = native {
         let checked = py.detach(|| native.check_variables(&concrete, None));
         checked.map_err(|error| exception(py, &error.into()))?;

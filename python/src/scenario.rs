@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::{Scenario as Concrete, ScenarioFile, Setting, library, source};
+use closecall_scenarios::{Scenario as Concrete, ScenarioError, ScenarioFile, Setting, library, source};
+use closecall_sensors::SensorMode;
 use closecall_simulation::SampleError;
 use closecall_traffic::Value;
 use pyo3::prelude::*;
@@ -27,6 +28,11 @@ pub(crate) struct Scenario {
 }
 
 impl Scenario {
+    /// Checks that the scenario can run with other sensors than its own.
+    pub(crate) fn check_in(&self, mode: SensorMode) -> Result<(), ScenarioError> {
+        self.file.check_faults_in(mode)
+    }
+
     /// Returns the concrete scenario of one sample, as `closecall run` makes it.
     pub(crate) fn concrete(&self, seed: u64, sample: u64) -> Result<Concrete, SampleError> {
         let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };

@@ -278,6 +278,11 @@ impl ScenarioFile {
         Self { program_folder: folder.and_then(Path::to_str).map(str::to_owned), ..self }
     }
 
+    /// Returns the folder in which the perception program runs; `None` for the folder of this program.
+    pub fn program_folder(&self) -> Option<&str> {
+        self.program_folder.as_deref()
+    }
+
     /// Returns the program that perceives in place of the built-in chain, if the file names one.
     pub fn program(&self) -> Option<ProgramSettings> {
         let sensors = self.config.sensors.check(&self.space.nominal()).ok()?;

@@ -70,9 +70,9 @@ pub struct SensorsConfig {
     /// DBSCAN: 2 to 20. Default: 3.
     #[serde(skip_serializing_if = "is_default_core_points")]
     pub cluster_core_points: u8,
-    /// What processes the scans of the rear LiDARs in mode `full`: `built-in` by default, or
-    /// `exec:COMMAND`, a program that answers detections or tracks. The file then runs a program:
-    /// read a file of somebody else before you run it.
+    /// What processes the scans of the rear LiDARs in mode `full`: `built-in` by default, or a program
+    /// that answers detections or tracks, `exec:COMMAND` or the shared library `lib:PATH`. The file
+    /// then runs a program: read a file of somebody else before you run it.
     #[serde(skip_serializing_if = "is_built_in")]
     pub perception: String,
     /// Time limit of each answer of that program (ms). The first may take 10 s. Default: 1000.

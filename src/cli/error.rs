@@ -407,9 +407,8 @@ impl From<&CliError> for ExitCode {
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
             CliError::NothingFound { .. } => Self::Inconclusive,
-            CliError::Plan(
-                PlanError::Controller { .. } | PlanError::WithoutMis { .. } | PlanError::WithoutHuman { .. },
-            ) => Self::InvalidInput,
+            CliError::Plan(PlanError::Controller { source, .. }) => FailureKind::from(source).into(),
+            CliError::Plan(PlanError::WithoutMis { .. } | PlanError::WithoutHuman { .. }) => Self::InvalidInput,
             CliError::Usage { .. }
             | CliError::Aerial(AerialError::Option { .. })
             | CliError::Gates(_)

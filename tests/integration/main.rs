@@ -66,6 +66,7 @@ mod paper;
 mod paper_figure;
 mod perceive;
 mod perception;
+mod perception_libraries;
 mod ramp;
 mod rare;
 mod readme;

@@ -215,19 +215,24 @@ fn the_header_and_the_examples_in_c_compile_without_warnings() {
         let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-fsyntax-only", "-I", "controllers/include"];
         Command::new(compiler).current_dir(ROOT).args(strict).args(arguments).output()
     };
-    let sources: [&[&str]; 4] = [
+    let sources: [&[&str]; 6] = [
         &["-std=c11", "examples/acc_controller.c"],
+        &["-std=c11", "examples/groups_perception.c"],
         &["-std=c11", "-DFMI=2", "examples/fmu/acc.c"],
         &["-std=c11", "-DFMI=3", "examples/fmu/acc.c"],
         &["-std=c99", "-x", "c", "controllers/include/closecall_controller.h"],
+        &["-std=c99", "-x", "c", "controllers/include/closecall_perception.h"],
     ];
     for source in sources {
         let output = check("cc", source).unwrap();
         assert!(output.status.success(), "{source:?}: {}", stderr(&output));
     }
-    // The header is for C++, too. Not every machine has a compiler for it.
-    if let Ok(output) = check("c++", &["-std=c++11", "-x", "c++", "controllers/include/closecall_controller.h"]) {
-        assert!(output.status.success(), "{}", stderr(&output));
+    // The headers are for C++, too. Not every machine has a compiler for it.
+    for name in ["controller", "perception"] {
+        let header = format!("controllers/include/closecall_{name}.h");
+        if let Ok(output) = check("c++", &["-std=c++11", "-x", "c++", &header]) {
+            assert!(output.status.success(), "{}", stderr(&output));
+        }
     }
 }
 

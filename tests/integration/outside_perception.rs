@@ -19,9 +19,15 @@ fn setting(command: &str) -> String {
     format!("sensors.perception=\"exec:{command}\"")
 }
 
-/// Runs a sample with a perception and further arguments.
+/// Runs a sample with a command as perception and further arguments.
 fn run(scenario: &str, command: &str, more: &[&str]) -> Output {
-    let (path, perception) = (library(scenario).display().to_string(), setting(command));
+    run_with(scenario, &format!("exec:{command}"), more)
+}
+
+/// Runs a sample with a perception and further arguments.
+pub(crate) fn run_with(scenario: &str, perception: &str, more: &[&str]) -> Output {
+    let path = library(scenario).display().to_string();
+    let perception = format!("sensors.perception=\"{perception}\"");
     let args = ["run", &path, "--sensors", "full", "--set", &perception];
     closecall([&args, more].concat())
 }
@@ -57,11 +63,11 @@ fn rear_tracks(path: &Path) -> Vec<(f64, Option<String>, f64)> {
 }
 
 /// Checks that the rear vehicle is followed with its speed, from the second of a run on that is stated, and that the system engages.
-fn assert_drives(command: &str, from_s: f64, more: &[&str]) {
+pub(crate) fn assert_drives(perception: &str, from_s: f64, more: &[&str]) {
     let folder = folder();
     let tracks = folder.path().join("tracks.parquet");
     let files = ["--seed", "1", "--format", "json", "--tracks", tracks.to_str().unwrap()];
-    let outcome: Value = json(&run("low-thw-overtake", command, &[&files, more].concat()), 0);
+    let outcome: Value = json(&run_with("low-thw-overtake", perception, &[&files, more].concat()), 0);
     let engaged_at_s = outcome["mis"]["engaged_at_s"].as_f64().unwrap_or_else(|| panic!("{}", outcome["mis"]));
     assert!(engaged_at_s > 1.0, "{engaged_at_s}");
     let rows = rear_tracks(&tracks);
@@ -70,14 +76,14 @@ fn assert_drives(command: &str, from_s: f64, more: &[&str]) {
     assert!(of_rear.len() > 100, "{} rows", of_rear.len());
     let square: f64 = of_rear.iter().map(|(_, _, error_mps)| error_mps * error_mps).sum();
     let rmse_mps = (square / of_rear.len() as f64).sqrt();
-    assert!(rmse_mps < 1.5, "{command}: {rmse_mps} m/s");
+    assert!(rmse_mps < 1.5, "{perception}: {rmse_mps} m/s");
 }
 
 #[test]
 fn the_example_with_scikit_learn_drives_the_headline() {
     let Some(python) = python_with("numpy, scipy, sklearn") else { return };
-    let command = format!("{} examples/dbscan_perception.py", python.display());
-    assert_drives(&command, 3.5, &["--set", "sensors.perception-timeout-ms=20000"]);
+    let perception = format!("exec:{} examples/dbscan_perception.py", python.display());
+    assert_drives(&perception, 3.5, &["--set", "sensors.perception-timeout-ms=20000"]);
 }
 
 #[test]
@@ -87,7 +93,7 @@ fn tracks_and_detections_from_outside_drive_the_headline() {
     }
     for kind in ["tracks", "detections"] {
         let off = ["--set", "sensors.rear-camera.pipeline=off", "--set", "duration-s=12"];
-        assert_drives(&format!("{GROUPS} {kind}"), 5.0, &off);
+        assert_drives(&format!("exec:{GROUPS} {kind}"), 5.0, &off);
     }
 }
 
@@ -182,8 +188,8 @@ fn a_program_that_cannot_be_started_and_one_that_would_not_be_asked_are_refused(
     let output = closecall(["check", "low-thw-overtake", "--set", "sensors.perception=\"dbscan\""]);
     assert_eq!(code(&output), 3);
     assert!(
-        message(&output).contains("`built-in`, `exec:COMMAND`")
-            || String::from_utf8_lossy(&output.stdout).contains("`exec:COMMAND`")
+        message(&output).contains("`built-in`, `exec:COMMAND`, `lib:PATH`")
+            || String::from_utf8_lossy(&output.stdout).contains("`exec:COMMAND`, `lib:PATH`")
     );
 }
 

@@ -9,6 +9,7 @@ use closecall_sensors::inference_backend;
 use closecall_simulation::SampleError;
 use closecall_simulation::controller::exec::{Child, ExecError};
 use closecall_simulation::controller::isolated::Isolated;
+use closecall_simulation::perception::hosted;
 
 use super::{Answer, Question, Refusal, Task, task_identity};
 use crate::manifest::version;
@@ -221,6 +222,10 @@ fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String)
         Backend::Tract => None,
         Backend::OnnxRuntime(library) => Some(library.clone()),
     };
+    let hosted_perception = work.file.program().and_then(|program| {
+        let name = program.name();
+        hosted::words(&name).map(|words| (name, words))
+    });
     let child = Child::start(&isolated.process(&["samples"]), None)?;
     let task = line(&Task {
         version: version(),
@@ -231,6 +236,8 @@ fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<(Child, String)
         controller: isolated.clone(),
         sensors: work.arms[arm].sensors,
         onnxruntime,
+        program_folder: work.file.program_folder().map(str::to_owned),
+        hosted_perception,
     });
     let identity = task_identity(task.strip_suffix(b"\n").unwrap_or(&task));
     child.send(task);
@@ -247,6 +254,6 @@ fn line(message: &impl serde::Serialize) -> Vec<u8> {
 /// Returns the failure of a sample whose process has ended. Its message does not depend on the
 /// samples before.
 fn failure(error: &ExecError) -> SampleFailure {
-    let message = error.end_of_isolated().unwrap_or_else(|| format!("the controller failed: {error}"));
+    let message = error.end_of_isolated("the controller").unwrap_or_else(|| format!("the controller failed: {error}"));
     SampleFailure { kind: KIND.to_owned(), message }
 }

@@ -87,6 +87,11 @@ struct Task {
     sensors: Option<SensorMode>,
     /// The library of ONNX Runtime that runs the networks, if it does.
     onnxruntime: Option<PathBuf>,
+    /// The folder in which the perception program of the scenario runs.
+    program_folder: Option<String>,
+    /// The name of the perception that is an object of the program, with the words that start its
+    /// process.
+    hosted_perception: Option<(String, Vec<String>)>,
 }
 
 /// Returns the identity of a task: a hash of its line, which holds the scenario, the seed, the

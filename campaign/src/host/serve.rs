@@ -16,6 +16,7 @@ use closecall_sensors::camera::{Backend, Classifier};
 use closecall_sensors::set_inference_backend;
 use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::{Probe, UNPACKED};
+use closecall_simulation::perception::{hosted, probe_library, serve_library};
 use closecall_simulation::{Arm, SampleError};
 
 use super::{Answer, CHANGED, Question, Task, UNREADABLE, task_identity};
@@ -40,6 +41,8 @@ const COST_STEPS: u32 = 200_000;
 /// | `probe lib:PATH VARIABLES` | loads the file, and writes what it is |
 /// | `step lib:PATH TABLE` | answers control steps, with the protocol of external processes |
 /// | `samples` | runs whole samples |
+/// | `probe-perception PATH` | loads the library of a perception, and writes what it is |
+/// | `perceive PATH` | answers scans, with the protocol of perception processes |
 /// | `onnxruntime PATH` | loads ONNX Runtime and the network |
 /// | `cost lib:PATH` | measures a control step, and writes its mean wall time |
 ///
@@ -83,6 +86,11 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
             writeln!(answers, "{controller}: {:.3} µs per control step", 1e6 * step_s)
                 .map_err(|error| error.to_string())
         }
+        ["probe-perception", path] => {
+            let text = serde_json::to_string(&probe_library(Path::new(path))).map_err(|error| error.to_string())?;
+            writeln!(answers, "{text}").map_err(|error| error.to_string())
+        }
+        ["perceive", path] => serve_library(Path::new(path), requests, answers),
         // Loading it runs its code.
         ["onnxruntime", library] => {
             let library = PathBuf::from(library);
@@ -135,7 +143,11 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
         Err(reason) => return refuse(answers, lines.next(), (kind, reason)),
     };
     let name = controller.name().to_owned();
+    if let Some((name, words)) = task.hosted_perception {
+        hosted::register(&name, words);
+    }
     let file = ScenarioFile::parse(&task.path, &task.text, &[]).map_err(|error| error.to_string())?;
+    let file = file.with_program_in(task.program_folder.as_deref().map(Path::new));
     let arms = vec![Arm { controller, sensors: task.sensors }];
     let work = Work { file, sampling: task.sampling, arms, checks: task.checks, retry_crashed: 0 };
     let is_answered = Arc::new(AtomicBool::new(true));

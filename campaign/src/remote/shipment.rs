@@ -5,11 +5,10 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::controller::exec::ExecSettings;
 use tempfile::TempDir;
 
 use super::error::RemoteError;
-use crate::fingerprint::named_files;
+use crate::fingerprint::{named_files, program_files};
 use crate::manifest::Manifest;
 
 /// The data that a machine needs to run blocks of a campaign.
@@ -45,7 +44,7 @@ impl Shipment {
         let hosted = |arm: &&ControllerChoice| matches!(arm, ControllerChoice::Hosted(_));
         let mut files: Vec<ShippedFile> = Vec::new();
         let programs = manifest.programs();
-        let of_programs = programs.iter().flat_map(|program| named_files(&ExecSettings::from(program), None));
+        let of_programs = programs.iter().flat_map(|program| program_files(program, None));
         for (name, path) in manifest.arms.iter().flat_map(named).chain(of_programs) {
             // A program that was found by the search path, or has an absolute path, is a matter of each machine.
             if is_within(&name) && Path::new(&name) == path && files.iter().all(|file| file.name != name) {

@@ -13,7 +13,7 @@ use std::arch::asm;
 /// The floating-point environment, which is restored when this value is dropped. On other
 /// processors than x86-64 and AArch64, nothing is kept.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) struct Arithmetic {
+pub struct Arithmetic {
     #[cfg(target_arch = "x86_64")]
     mxcsr: u32,
     #[cfg(target_arch = "x86_64")]
@@ -26,7 +26,7 @@ impl Arithmetic {
     /// Keeps the environment of this thread.
     #[cfg(target_arch = "x86_64")]
     #[inline(never)]
-    pub(crate) fn keep() -> Self {
+    pub fn keep() -> Self {
         let (mut mxcsr, mut x87) = (0_u32, 0_u16);
         // SAFETY: both instructions write to the variables that they are given.
         unsafe {
@@ -39,7 +39,7 @@ impl Arithmetic {
     /// Keeps the environment of this thread.
     #[cfg(target_arch = "aarch64")]
     #[inline(never)]
-    pub(crate) fn keep() -> Self {
+    pub fn keep() -> Self {
         let fpcr: u64;
         // SAFETY: the instruction reads a register.
         unsafe { asm!("mrs {}, fpcr", out(reg) fpcr, options(nostack, preserves_flags)) };
@@ -48,7 +48,7 @@ impl Arithmetic {
 
     /// Keeps nothing.
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    pub(crate) fn keep() -> Self {
+    pub fn keep() -> Self {
         Self {}
     }
 }

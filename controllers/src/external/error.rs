@@ -55,6 +55,18 @@ pub enum LoadError {
         /// The version of this program.
         expected: u32,
     },
+    /// A function of the library states a value that the interface does not have.
+    #[error("{path}: `{function}` returned {actual}; expected {allowed}")]
+    Value {
+        /// The file.
+        path: String,
+        /// The function.
+        function: &'static str,
+        /// Its value.
+        actual: i64,
+        /// The allowed values.
+        allowed: &'static str,
+    },
     /// The system's loader refuses the library.
     #[error("failed to load {path}: {reason}")]
     Loader {

@@ -10,6 +10,8 @@
 //! * [`NativeController`] adapts such a controller to the closed loop.
 //! * [`bridge`] serves one as a process that speaks the protocol of external processes.
 //! * [`watch`] ends a process whose controller does not answer.
+//! * [`SharedLibrary`] and [`Arithmetic`] serve other interfaces of libraries, such as
+//!   `controllers/include/closecall_perception.h`.
 //!
 //! The code of a library can do anything to the process that loads it. This module therefore runs
 //! in worker processes, and the program that starts them learns of a crash from their end.
@@ -30,11 +32,14 @@ mod identity;
 mod library;
 mod loaded;
 mod platform;
+mod shared;
 pub mod watch;
 
+pub use arithmetic::Arithmetic;
 pub use controller::NativeController;
 pub use error::LoadError;
 pub use exchange::{Answer, Input, Setup};
 pub use fmu::{Given, VariableTable};
 pub use identity::Identity;
 pub use loaded::{Kind, Loaded, Variables, remove_unpacked, unload_all, unpack_for_children, use_unpacked};
+pub use shared::{SharedLibrary, text};

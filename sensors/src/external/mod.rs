@@ -23,8 +23,8 @@ pub use mount::{LidarMount, RadarMount};
 pub(crate) use outside::Outside;
 pub use pose::Pose;
 pub use settings::{
-    BUILT_IN, DEFAULT_IMAGE_STEP, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, EXEC_PREFIX, ImageSettings,
-    ProgramSettings, command_of,
+    BUILT_IN, DEFAULT_IMAGE_STEP, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, ImageSettings, ProgramKind,
+    ProgramSettings,
 };
 pub(crate) use settings::{ProgramChecks, check_program};
 

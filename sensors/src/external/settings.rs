@@ -1,4 +1,6 @@
 //! The keys of the `[sensors]` table that name a program, and what they are checked into.
+//!
+//! A program is a command or a shared library. The simulation runs both as processes.
 
 use closecall_traffic::{ConfigError, Problem, Time};
 
@@ -7,8 +9,38 @@ use crate::kept::kept;
 /// The value of `perception` that stands for the built-in chain.
 pub const BUILT_IN: &str = "built-in";
 
-/// The beginning of the value of `perception` that names a command.
-pub const EXEC_PREFIX: &str = "exec:";
+/// What a program is, by the word before the colon of its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProgramKind {
+    /// A command: `exec:COMMAND`.
+    Exec,
+    /// A shared library: `lib:PATH`.
+    Lib,
+    /// An object of the Python program that runs Closecall: `python:NAME`. A file cannot name one
+    /// that runs elsewhere.
+    Hosted,
+}
+
+impl ProgramKind {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Exec, Self::Lib, Self::Hosted];
+
+    /// Returns the word before the colon.
+    pub const fn prefix(self) -> &'static str {
+        match self {
+            Self::Exec => "exec",
+            Self::Lib => "lib",
+            Self::Hosted => "python",
+        }
+    }
+
+    /// Splits a value of `perception` into the kind and what follows the colon; `None` if it names no program.
+    pub fn split(perception: &str) -> Option<(Self, &str)> {
+        let (word, rest) = perception.split_once(':')?;
+        let kind = Self::ALL.into_iter().find(|kind| kind.prefix() == word)?;
+        (!rest.trim().is_empty()).then_some((kind, rest))
+    }
+}
 
 /// Default time limit of each answer (ms), that of a controller.
 pub const DEFAULT_PROGRAM_TIMEOUT_MS: u64 = 1_000;
@@ -40,7 +72,10 @@ pub struct ImageSettings {
 /// The program that perceives in place of the built-in chain, with its limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProgramSettings {
-    /// The command with its arguments, with the quotes of a shell.
+    /// What the program is.
+    pub kind: ProgramKind,
+    /// The command with its arguments, with the quotes of a shell, the path of the library, or the
+    /// name of the object with its version.
     pub command: &'static str,
     /// Time limit of each answer (ms).
     pub timeout_ms: u64,
@@ -55,7 +90,7 @@ pub struct ProgramSettings {
 impl ProgramSettings {
     /// Returns the program as a scenario names it.
     pub fn name(&self) -> String {
-        format!("{EXEC_PREFIX}{}", self.command)
+        format!("{}:{}", self.kind.prefix(), self.command)
     }
 
     /// Returns the same program in another folder.
@@ -72,11 +107,6 @@ pub(crate) struct ProgramChecks<'a> {
     /// Images per second (Hz), or 0 for none.
     pub(crate) image_hz: f64,
     pub(crate) image_step: u8,
-}
-
-/// Returns the command that a value of `perception` names; `None` if it names none.
-pub fn command_of(perception: &str) -> Option<&str> {
-    perception.strip_prefix(EXEC_PREFIX).filter(|command| !command.trim().is_empty())
 }
 
 /// Checks the keys that name a program. Returns `None` for the built-in chain.
@@ -98,14 +128,14 @@ pub(crate) fn check_program(keys: &ProgramChecks<'_>) -> Result<Option<ProgramSe
     if keys.perception == BUILT_IN {
         return Ok(None);
     }
-    let Some(command) = command_of(keys.perception) else {
-        let allowed = "`built-in`, `exec:COMMAND`".to_owned();
+    let Some((kind, command)) = ProgramKind::split(keys.perception) else {
+        let allowed = "`built-in`, `exec:COMMAND`, `lib:PATH`".to_owned();
         return Err(ConfigError::new(
             "perception",
             Problem::UnknownWord { value: keys.perception.to_owned(), allowed },
         ));
     };
-    Ok(Some(ProgramSettings { command: kept(command), timeout_ms, memory_mib, images, folder: None }))
+    Ok(Some(ProgramSettings { kind, command: kept(command), timeout_ms, memory_mib, images, folder: None }))
 }
 
 #[cfg(test)]
@@ -125,10 +155,18 @@ mod tests {
         assert_eq!(program.images, Some(ImageSettings { period: Time::from_ms(200), step: 2 }));
         let again = check("exec:python3 mine.py", 1, 1).unwrap().unwrap();
         assert!(std::ptr::eq(program.command, again.command));
-        assert_eq!(program.name(), "exec:python3 mine.py");
-        for wrong in ["", "python3 mine.py", "exec:", "exec:  ", "lib:./mine.so", "builtin"] {
+        assert_eq!((program.kind, program.name()), (ProgramKind::Exec, "exec:python3 mine.py".to_owned()));
+        let library = check("lib:./my perception.so", 250, 64).unwrap().unwrap();
+        assert_eq!((library.kind, library.command), (ProgramKind::Lib, "./my perception.so"));
+        assert_eq!(library.name(), "lib:./my perception.so");
+        let object = check("python:Mine@1a2b", 250, 64).unwrap().unwrap();
+        assert_eq!((object.kind, object.name()), (ProgramKind::Hosted, "python:Mine@1a2b".to_owned()));
+        for wrong in ["", "python3 mine.py", "exec:", "exec:  ", "lib:", "fmu:./mine.fmu", "builtin"] {
             let error = check(wrong, 1_000, 1_024).unwrap_err();
-            assert!(error.starts_with("`perception` is ") && error.contains("`exec:COMMAND`"), "{wrong}: {error}");
+            assert!(
+                error.starts_with("`perception` is ") && error.contains("`exec:COMMAND`, `lib:PATH`"),
+                "{wrong}: {error}"
+            );
         }
     }
 

@@ -31,7 +31,7 @@ pub const UNPACKED: &str = "unpacked";
 
 /// Time limit for loading a library or an FMU, at least. It may first have to read its files or to
 /// start an interpreter.
-const LOAD_TIMEOUT: Duration = Duration::from_secs(10);
+pub(crate) const LOAD_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The words that start this program.
 static PROGRAM: OnceLock<Vec<String>> = OnceLock::new();
@@ -205,6 +205,16 @@ pub enum NativeError {
         controller: String,
         /// The reason for which it cannot be started.
         reason: String,
+    },
+    /// The file of a perception is not of the expected kind.
+    #[error("failed to use the perception `{program}`: {reason}")]
+    RefusedProgram {
+        /// The program, as the scenario names it.
+        program: String,
+        /// What is wrong, and what is expected.
+        reason: String,
+        /// Whether the file cannot be read.
+        is_io: bool,
     },
     /// A perception program cannot be started.
     #[error("failed to start the perception program `{program}`: {reason}")]

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use crate::controller::exec::{ExecError, excerpt};
 
 /// Largest number of detections or tracks in an answer. An assumption: a motorway has some tens of vehicles in view.
-const MOST_OBJECTS: usize = 256;
+pub(super) const MOST_OBJECTS: usize = 256;
 /// Largest coordinate (m): that of the LiDARs' region of interest.
 const POSITION: Range = Range::closed(-500.0, 500.0);
 /// Largest speed (m/s). An assumption: twice that of the fastest vehicle of a motorway.
@@ -29,7 +29,10 @@ const SUM_TOLERANCE: f64 = 1e-3;
 /// Longest time by which a detection may be older than its scan (ns).
 const OLDEST_NS: i64 = 200_000_000;
 /// Height of the highest point of a detection that states none (m): that of a car.
-const USUAL_TOP_M: f64 = 1.5;
+pub(super) const USUAL_TOP_M: f64 = 1.5;
+
+/// The key under which the process of a library or of an object says why it has no answer.
+pub(super) const ERROR_KEY: &str = "error";
 
 /// What a process answers with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +42,8 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    const fn key(self) -> &'static str {
+    /// Returns the key of the list in an answer.
+    pub(super) const fn key(self) -> &'static str {
         match self {
             Self::Detections => "detections",
             Self::Tracks => "tracks",
@@ -56,6 +60,19 @@ pub(super) enum AnswerError {
     /// A field is not what it must be.
     #[error("the process answered {line:?}: `{field}` must be {needed}, it is {found}")]
     Field { line: String, field: String, needed: String, found: String },
+}
+
+impl AnswerError {
+    /// Returns the message about a library or an object. Its line is that of the process around it.
+    pub(super) fn without_line(&self, who: &str) -> String {
+        match self {
+            // A number that is not finite is written as a word.
+            Self::Field { field, needed, found, .. } => {
+                format!("{who} answered: `{field}` must be {needed}, it is {}", found.trim_matches('"'))
+            }
+            Self::NotJson { .. } => self.to_string(),
+        }
+    }
 }
 
 /// A field that is not what it must be, without the line that it stands in.
@@ -86,6 +103,11 @@ pub(super) fn kind(line: &[u8]) -> Result<Kind, AnswerError> {
         Some("tracks") => Ok(Kind::Tracks),
         _ => Err(Wrong::new(KEY.to_owned(), "\"detections\" or \"tracks\"", object.get(KEY)).in_line(line)),
     }
+}
+
+/// Returns why the process of a library or of an object has no answer, if it says so.
+pub(super) fn stated_error(line: &[u8]) -> Option<String> {
+    object(line).ok()?.get(ERROR_KEY)?.as_str().map(str::to_owned)
 }
 
 /// Parses the answer to the question at `time`. `answered` is the number of answers before, including the greeting.
@@ -412,6 +434,21 @@ mod tests {
         assert_eq!(track.state, Vector4::new(-40.5, 0.25, 36.0, 0.0));
         assert_eq!((track.covariance[(0, 2)], track.class.0), (0.01, [0.75, 0.25, 0.0, 0.0]));
         assert_eq!(answer(Kind::Tracks, ""), Ok(PerceptionAnswer::Tracks(Vec::new())));
+    }
+
+    #[test]
+    fn a_message_about_a_library_has_the_field_and_the_number_without_the_line() {
+        let changed = TRACK.replacen("[0,0.01,0,0]", "[0,\"NaN\",0,0]", 1).replace('\n', "");
+        let line = format!("{{\"time_ns\":80000000,\"tracks\":[{changed}]}}");
+        let error = parse(line.as_bytes(), (Kind::Tracks, TIME), 3).unwrap().unwrap_err().without_line("the library");
+        assert!(
+            error.starts_with("the library answered: `tracks[0].covariance[1][1]` must be a variance: "),
+            "{error}"
+        );
+        assert!(error.ends_with(", it is NaN"), "{error}");
+        let failed = br#"{"time_ns":80000000,"error":"no map"}"#;
+        assert_eq!(stated_error(failed), Some("no map".to_owned()));
+        assert_eq!(stated_error(line.as_bytes()), None);
     }
 
     #[test]

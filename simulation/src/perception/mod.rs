@@ -1,4 +1,5 @@
-//! A perception of the user's own as a separate process, written in any language: `sensors.perception = "exec:COMMAND"`.
+//! A perception of the user's own as a separate process, written in any language: `sensors.perception = "exec:COMMAND"`. A shared
+//! library, `"lib:PATH"`, and an object of a Python program are such processes, too: see `perception/library` and [`hosted`].
 //!
 //! ```text
 //!  closecall ── hello, one line per control step with scans ──▶ standard input  ┐
@@ -24,8 +25,11 @@
 //! `docs/reference/perception.md` has every key.
 
 mod answer;
+pub mod hosted;
+mod library;
 mod process;
 mod question;
 
+pub use library::{probe as probe_library, serve as serve_library};
 pub(crate) use process::PerceptionProcess;
 pub use process::{identify_program, try_program};

@@ -144,7 +144,7 @@ impl ExecController {
 impl ExecController {
     fn failure(&self, error: &ExecError, time: Time) -> ControllerError {
         // The process of a library or an FMU repeats the time.
-        let end = if self.repeats_time { error.end_of_isolated() } else { None };
+        let end = if self.repeats_time { error.end_of_isolated("the controller") } else { None };
         let reason = end.unwrap_or_else(|| error.to_string());
         if error.is_late() { ControllerError::Late { reason, time } } else { ControllerError::Own { reason, time } }
     }

@@ -139,17 +139,18 @@ impl ExecError {
     }
 
     /// Returns how a library or another controller ended the process in which it runs; `None` if it
-    /// did not. The message does not depend on what the process did before: it is the same whether
-    /// the process answers each step or runs whole samples.
-    pub fn end_of_isolated(&self) -> Option<String> {
+    /// did not. `who` ended it, such as `the controller`. The message does not depend on what the
+    /// process did before: it is the same whether the process answers each step or runs whole
+    /// samples.
+    pub fn end_of_isolated(&self, who: &str) -> Option<String> {
         match self {
             Self::Ended { status, stderr, .. } => {
                 // Whether the system keeps a memory dump depends on its settings.
                 let status = status.to_string().replace(" (core dumped)", "");
-                Some(format!("the controller ended its process ({status}){}", last_lines(stderr)))
+                Some(format!("{who} ended its process ({status}){}", last_lines(stderr)))
             }
             Self::Closed { stderr, .. } => {
-                Some(format!("the controller closed the output of its process{}", last_lines(stderr)))
+                Some(format!("{who} closed the output of its process{}", last_lines(stderr)))
             }
             _ => None,
         }

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use closecall_sensors::external::ProgramSettings;
 use serde::{Deserialize, Serialize};
 
 /// The name of an external controller in reports, and the prefix of its `--controller` argument.
@@ -26,14 +25,6 @@ pub struct ExecSettings {
     pub timeout_ms: u64,
     /// Largest resident memory of the process (MiB).
     pub memory_mib: u64,
-}
-
-impl From<&ProgramSettings> for ExecSettings {
-    /// Returns the settings of a perception program.
-    fn from(program: &ProgramSettings) -> Self {
-        let ProgramSettings { command, timeout_ms, memory_mib, .. } = *program;
-        Self { command: command.to_owned(), timeout_ms, memory_mib }
-    }
 }
 
 impl ExecSettings {
