@@ -258,12 +258,19 @@ impl Rare<'_> {
             return ExitCode::SampleError;
         }
         if let Some(search) = report.search {
-            return if search.has_event { ExitCode::Fail } else { ExitCode::Pass };
+            return match search.has_event {
+                true => ExitCode::Fail,
+                // An event that cannot happen is not found either.
+                false if !report.not_judged.is_empty() => ExitCode::Inconclusive,
+                false => ExitCode::Pass,
+            };
         }
         match (&self.gate, report.main()) {
-            (Some(_), _) => self
-                .judge(report)
-                .map_or(ExitCode::Inconclusive, |passes| if passes { ExitCode::Pass } else { ExitCode::Fail }),
+            (Some(_), _) => match self.judge(report) {
+                Some(true) if report.not_judged.is_empty() => ExitCode::Pass,
+                Some(false) => ExitCode::Fail,
+                Some(true) | None => ExitCode::Inconclusive,
+            },
             (None, Some(_)) => ExitCode::Pass,
             (None, None) => ExitCode::Inconclusive,
         }
@@ -287,6 +294,7 @@ impl Rare<'_> {
     fn word(&self, report: &RareReport) -> &'static str {
         match self.judge(report) {
             _ if report.errors > 0 => "ERROR",
+            Some(true) if !report.not_judged.is_empty() => "NOT JUDGED",
             Some(true) => "PASS",
             Some(false) => "FAIL",
             None => "INCONCLUSIVE",

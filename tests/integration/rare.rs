@@ -170,6 +170,30 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
 }
 
 #[test]
+fn an_event_that_cannot_happen_is_not_judged() {
+    let run = |words: &str| {
+        let words = format!("campaign low-thw-overtake --sensors object --event collision {words}");
+        closecall(words.split_whitespace())
+    };
+    // After 2 s no vehicle has come near, and nothing can collide.
+    for method in ["importance", "subset"] {
+        let text = stdout(&run(&format!("--design {method} -n 3000 --max-probability 0.1 --set duration-s=2")), 4);
+        if method == "importance" {
+            assert!(text.contains("NOT JUDGED: 1.000e-1 allowed"), "{text}");
+        }
+        assert!(text.contains("what the scenario is about did not happen: low-thw-overtake: lead_braked"), "{text}");
+    }
+    let value = json(&run("--design importance -n 3000 --max-probability 0.1 --set duration-s=2 --format json"), 4);
+    assert_eq!(value["gate"]["verdicts"][0], "NOT JUDGED");
+    assert!(value["scenarios"][0]["not_judged"][0].as_str().unwrap().contains("at least 95.0 % expected"), "{value}");
+    let search = stdout(&run("--design search -n 300 --set duration-s=2"), 4);
+    assert!(search.contains("not found") && search.contains("did not happen"), "{search}");
+    // As it is, the scenario is about what it says, and a limit that is too low still fails.
+    let value = json(&run("--design importance -n 3000 --max-probability 0.9 --format json"), 0);
+    assert_eq!(value["scenarios"][0]["not_judged"].as_array().unwrap().len(), 0, "{value}");
+}
+
+#[test]
 fn a_gate_that_can_only_fail_ends_a_campaign_that_fails_fast() {
     // The ego collides in neither arm; its smallest gap falls below 30 m in most samples.
     let path = fixture();

@@ -24,6 +24,7 @@ use super::files::{JOURNAL, MANIFEST, RESULT};
 use super::method::Method;
 use super::problem::{Point, Response};
 use crate::folder::FolderError;
+use crate::gate::Course;
 use crate::journal::{line, parse, read_line};
 use crate::lock::Lock;
 use crate::manifest::Manifest;
@@ -71,6 +72,9 @@ pub(super) struct RareRecord {
     pub(super) response: KeptResponse,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) failure: Option<SampleFailure>,
+    /// What the run shows of a scenario that states what must happen in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) course: Option<Course>,
 }
 
 /// Everything that determines the result.

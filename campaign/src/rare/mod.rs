@@ -28,6 +28,7 @@ mod nearness;
 mod plan;
 mod points;
 mod problem;
+mod relevance;
 mod report;
 mod runs;
 mod search;

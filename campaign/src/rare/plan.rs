@@ -9,6 +9,7 @@ use super::method::Method;
 use super::nearness::Nearness;
 use super::points::PointRunner;
 use super::problem::Seed;
+use super::relevance::Relevance;
 use super::report::RareReport;
 use super::runs::Runs;
 use super::search::search;
@@ -62,6 +63,7 @@ impl RarePlan {
             done: 0,
             errors: 0,
             first_error: None,
+            relevance: Relevance::of(work),
             nearest: Vec::new(),
         };
         let mut report = match self.method {
@@ -80,6 +82,7 @@ impl RarePlan {
         }
         report.scenario.clone_from(&file.config().name);
         report.parameters = file.space().varying().map(|(name, _)| name.to_string()).collect();
+        report.not_judged = runs.relevance.not_judged();
         (report.errors, report.first_error, report.nearest) = (runs.errors, runs.first_error, runs.nearest);
         if report.errors > 0 {
             // A run that failed may have been an event.

@@ -8,8 +8,10 @@ use super::journal::{RareJournal, RareRecord};
 use super::nearness::Nearness;
 use super::points::{PointRunner, point_samples};
 use super::problem::{Point, Response, Simulator};
+use super::relevance::Relevance;
 use super::report::Nearest;
 use crate::campaign_error::CampaignError;
+use crate::gate::Course;
 use crate::record::{Record, SampleFailure};
 use crate::runner::Work;
 use crate::stop::StopFlag;
@@ -33,6 +35,8 @@ pub(super) struct Runs<'a> {
     /// Runs that ended in an error, and the first error.
     pub(super) errors: u64,
     pub(super) first_error: Option<SampleFailure>,
+    /// What the runs show of the system under test.
+    pub(super) relevance: Relevance,
     /// The events that are nearest to the nominal case.
     pub(super) nearest: Vec<Nearest>,
 }
@@ -42,7 +46,8 @@ const SHOWN: usize = 3;
 
 impl Runs<'_> {
     /// Counts a run, whether it is new or read from the journal.
-    fn count(&mut self, point: &Point, response: &Response, failure: Option<&SampleFailure>) {
+    fn count(&mut self, point: &Point, response: &Response, failure: Option<&SampleFailure>, course: Option<Course>) {
+        self.relevance.count(self.done, course);
         self.done += 1;
         self.errors += u64::from(failure.is_some());
         if self.first_error.is_none() {
@@ -70,23 +75,23 @@ impl Runs<'_> {
                 Some(journal) => journal.next(scenario, self.done, point)?,
                 None => None,
             };
-            let Some(RareRecord { response, failure, .. }) = record else { break };
+            let Some(RareRecord { response, failure, course, .. }) = record else { break };
             let response = response.into();
-            self.count(point, &response, failure.as_ref());
+            self.count(point, &response, failure.as_ref(), course);
             responses.push(response);
         }
         Ok(responses)
     }
 
     fn push(&mut self, point: &Point, record: &Record) -> Result<Response, CampaignError> {
-        let response = self.nearness.response(record);
+        let (response, course) = (self.nearness.response(record), self.relevance.course(record));
         let failure = record.arms.iter().find_map(|arm| arm.result.as_ref().err()).cloned();
         if let Some(journal) = self.journal.as_mut() {
             let scenario = self.work.file.config().name.clone();
-            let (run, failure) = (self.done, failure.clone());
-            journal.append(&RareRecord { scenario, run, point: point.into(), response: response.into(), failure })?;
+            let (run, failure, response) = (self.done, failure.clone(), response.into());
+            journal.append(&RareRecord { scenario, run, point: point.into(), response, failure, course })?;
         }
-        self.count(point, &response, failure.as_ref());
+        self.count(point, &response, failure.as_ref(), course);
         Ok(response)
     }
 }
@@ -95,6 +100,7 @@ impl Simulator for Runs<'_> {
     type Error = RareError;
 
     fn run(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
+        self.relevance.begin(points.len() as u64);
         let mut responses = self.kept(points)?;
         let new = &points[responses.len()..];
         let (index, work, workers, remote, stop) = (self.index, self.work, self.workers, self.remote, self.stop);
