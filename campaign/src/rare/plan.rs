@@ -14,6 +14,7 @@ use super::report::RareReport;
 use super::runs::Runs;
 use super::search::search;
 use super::subset::subset;
+use crate::partition::Partition;
 use crate::runner::Work;
 use crate::stop::StopFlag;
 use crate::workers::Workers;
@@ -31,6 +32,9 @@ pub struct RarePlan {
     pub workers: Workers,
     /// The runner of the runs, if the threads of this process do not run them.
     pub remote: Option<Arc<dyn PointRunner>>,
+    /// The part of the last runs that are run; `None` for all of them. Only importance sampling has
+    /// parts.
+    pub part: Option<Partition>,
 }
 
 impl RarePlan {
@@ -38,7 +42,8 @@ impl RarePlan {
     /// `journal` are not run again. `on_run` is called after each run.
     ///
     /// # Errors
-    /// [`RareError`] if there is no result. The campaign can go on from its journal.
+    /// [`RareError`] if there is no result. The campaign can go on from its journal. A part ends with
+    /// [`RareError::PartEnds`].
     pub fn run(
         &self,
         (index, work): (usize, &Arc<Work>),
@@ -60,6 +65,7 @@ impl RarePlan {
             stop,
             journal,
             on_run,
+            part: self.part,
             done: 0,
             errors: 0,
             first_error: None,
