@@ -100,11 +100,12 @@ impl From<&MergeError> for FailureKind {
     fn from(error: &MergeError) -> Self {
         match error {
             MergeError::Campaign(error) => Self::from(error),
-            MergeError::OutOfOrder { .. } => Self::InvalidInput,
+            MergeError::OutOfOrder { .. } | MergeError::OtherRun { .. } => Self::InvalidInput,
             MergeError::NotAPart { .. }
             | MergeError::OtherCampaign { .. }
             | MergeError::Duplicate { .. }
             | MergeError::Missing { .. }
+            | MergeError::Rare(_)
             | MergeError::Incomplete { .. } => Self::Usage,
         }
     }

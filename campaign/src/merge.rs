@@ -12,6 +12,7 @@ use super::folder::{Folder, FolderError, LockedFolder};
 use super::folder_error::listed;
 use super::manifest::Manifest;
 use super::partition::Partition;
+use super::rare::RareError;
 use super::record::Record;
 use super::runner::Work;
 use super::wall_times::WallTime;
@@ -66,6 +67,26 @@ pub enum MergeError {
         /// Number of samples that it should hold.
         planned: u64,
     },
+    /// Two parts of a rare event differ in a run that both have made.
+    #[error(
+        "failed to merge: {} and {} differ in run {run} of `{scenario}`: the controller, a file that it imports or the program is \
+         not the same on both machines, or does not repeat",
+        first.display(),
+        second.display()
+    )]
+    OtherRun {
+        /// One folder.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+        /// The scenario.
+        scenario: String,
+        /// The number of the run.
+        run: u64,
+    },
+    /// The parts of a rare event have no estimate.
+    #[error("failed to merge: {0}")]
+    Rare(RareError),
     /// A part holds a sample that belongs to another part, or that is not in the order of the plan.
     #[error("failed to merge: {} holds sample {sample} of `{scenario}` out of order", path.display())]
     OutOfOrder {
@@ -81,6 +102,15 @@ pub enum MergeError {
 impl From<FolderError> for MergeError {
     fn from(error: FolderError) -> Self {
         Self::Campaign(error.into())
+    }
+}
+
+impl From<RareError> for MergeError {
+    fn from(error: RareError) -> Self {
+        match error {
+            RareError::Campaign(error) => Self::Campaign(error),
+            other => Self::Rare(other),
+        }
     }
 }
 

@@ -309,6 +309,14 @@ impl ScenarioFile {
         &self.settings
     }
 
+    /// Returns the setting that is undone if `key` is given values; `None` if there is none, or `key`
+    /// is no path of keys.
+    pub fn undone_by(&self, key: &str) -> Option<&Setting> {
+        // Of two values, one differs from the value of a setting with the same key.
+        let values = ["0", "1"].map(|value| format!("{key}={value}").parse::<Setting>().ok());
+        self.settings.iter().find(|set| values.iter().flatten().any(|value| value.undoes(set)))
+    }
+
     /// Returns the text of the scenario, with all settings applied.
     pub fn text(&self) -> &str {
         &self.text

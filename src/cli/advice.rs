@@ -9,6 +9,7 @@ use closecall_campaign::folder::FolderError;
 use closecall_campaign::gate::AssemblyError;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::merge::MergeError;
+use closecall_campaign::rare::RareError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::session;
 use closecall_campaign::verdict::{Decision, Judgement};
@@ -39,7 +40,7 @@ fn advice(error: &CliError) -> Option<&'static str> {
         CliError::Folder(error) => of_folder(error),
         CliError::Campaign(error) | CliError::Merge(MergeError::Campaign(error)) => of_campaign(error),
         CliError::Merge(MergeError::NotAPart { .. }) => Some("`closecall campaign … --partition K/N` runs a part"),
-        CliError::Merge(MergeError::Incomplete { .. }) => Some(RESUME),
+        CliError::Merge(MergeError::Incomplete { .. } | MergeError::Rare(RareError::MissingRun { .. })) => Some(RESUME),
         CliError::Saved(error) | CliError::Causes(CausesError::Saved(error)) => of_saved(error).or(Some(ALL_OPTIONS)),
         CliError::Report(ReportError::Folder(error)) => of_folder(error),
         CliError::Report(ReportError::Saved(error)) => of_saved(error),

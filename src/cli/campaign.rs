@@ -438,6 +438,25 @@ fn check_arguments(args: &CampaignArgs) -> Result<(), CliError> {
     }
 }
 
+/// Refuses parts of a rare event whose runs depend on each other, and a gate on one part.
+fn check_parts(method: Method, has_gate: bool) -> Result<(), CliError> {
+    let why = match method {
+        Method::Importance if has_gate => {
+            "a part has no estimate: --max-probability belongs to `closecall tool merge`, which makes it of all parts"
+        }
+        Method::Importance => return Ok(()),
+        Method::Subset => {
+            "--partition: --design subset has no parts, because the number of its repetitions follows from the first of them, \
+             which are most of its runs: --design importance has parts, and --ray runs both on several machines"
+        }
+        Method::Search => {
+            "--partition: --design search has no parts, because each round depends on the rounds before, and the first event ends \
+             it: --ray runs the runs of a round on several machines"
+        }
+    };
+    Err(CliError::usage(why))
+}
+
 /// Estimates the probability of a rare event.
 fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliError> {
     let is_named = [
@@ -445,7 +464,6 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         (args.plan.until_certain, "--until-certain"),
         (args.plan.time_budget().is_some(), "--time-budget"),
         (args.plan.names_checks(), "--check-share, --check-at-most and --no-validity-checks"),
-        (args.partition.is_some(), "--partition"),
         (args.record.is_some(), "--record"),
         (args.retry_crashed.is_some(), "--retry-crashed"),
         (args.end.is_named(), "--fail-fast, --max-errors and --retry-errors"),
@@ -458,6 +476,9 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         return Err(CliError::usage(format!(
             "the runs of --design {method} are no independent samples of the scenario: it cannot be combined with {option}"
         )));
+    }
+    if args.partition.is_some() {
+        check_parts(method, args.gates.max_probability.is_some())?;
     }
     let folder = match args.results.place() {
         Place::Named(path) => Some(path),
@@ -476,7 +497,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         folder,
         resume: args.results.is_resumed(),
         format: args.format,
-        can_draw_seed: true,
+        can_draw_seed: args.partition.is_none(),
     };
     rare.run(&args.plan(files, controllers)?)
 }

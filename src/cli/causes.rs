@@ -19,13 +19,13 @@ use closecall_studies::exposure::{
 };
 use closecall_studies::failures::explain_failures;
 use closecall_studies::map::{MapGrid, MapText, map as compute_map, write_map};
-use closecall_studies::minimize::{MinimizedText, minimize_sample, output_files, write_files};
+use closecall_studies::minimize::{MinimizedText, NearestSearch, minimize_sample, output_files, write_files};
 use serde_json::json;
 
 use super::CliError;
 use super::actions::command_for;
 use super::advice::to_provide;
-use super::args::{Format, ReadArgs, ReadFiles, SavedSampleArgs, SetArgs, read_noting};
+use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_text, print_written};
 use super::protect::{of_campaign, protect};
@@ -90,14 +90,33 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall minimize closecall-results 17",
-    "closecall minimize closecall-results 17 -o smallest.toml",
-    "closecall minimize closecall-results 17 --scenario low-thw-overtake --controller mis --format json",
+    "closecall minimize closecall-results 17 --scenario low-thw-overtake --controller mis -o smallest.toml",
+    "closecall minimize closecall-results --nearest --runs 1000 --format json",
 ]))]
 pub(super) struct MinimizeArgs {
+    /// Folder of the campaign
+    dir: PathBuf,
+    /// Number of the sample [default: with --nearest, the failing samples that are nearest to the
+    /// nominal case]
+    #[arg(required_unless_present = "nearest")]
+    sample: Option<u64>,
+    /// Search the failing case that is nearest to the nominal case, in standard deviations, from one
+    /// sample or from all failing samples
+    #[arg(long, help_heading = heading::METHOD)]
+    nearest: bool,
+    /// With --nearest: largest number of runs of the search [default: 2000]
+    #[arg(short = 'n', long, value_name = "N", value_parser = count, requires = "nearest", help_heading = heading::METHOD)]
+    runs: Option<u64>,
+    /// Name of the scenario; required if the campaign has several
+    #[arg(long, help_heading = heading::SAMPLES)]
+    scenario: Option<String>,
+    /// Controller of the arm to run again [default: the controller under test]
+    #[arg(long, value_name = "NAME", help_heading = heading::CONTROLLER)]
+    controller: Option<String>,
     #[command(flatten)]
-    saved_sample: SavedSampleArgs,
-    /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is
-    /// written beside it, with `-passes` at the end of its name
+    saved: SavedArgs,
+    /// Scenario file to write [default: SCENARIO-SAMPLE.toml, with --nearest SCENARIO-nearest.toml].
+    /// The nearest case that passes is written beside it, with `-passes` at the end of its name
     #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
@@ -105,19 +124,30 @@ pub(super) struct MinimizeArgs {
     format: Format,
 }
 
+/// Largest number of runs of a search for the nearest failure, unless another one is named.
+const NEAREST_RUNS: u64 = 2_000;
+
 pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
-    let saved = args.saved_sample.saved.open(&args.saved_sample.dir)?;
-    let case = Case::of(
-        &saved,
-        args.saved_sample.scenario.as_deref(),
-        args.saved_sample.sample,
-        args.saved_sample.controller.as_deref(),
-    );
-    let case = case.map_err(CausesError::from)?;
+    let MinimizeArgs { sample, scenario, controller, .. } = args;
+    let (scenario, controller) = (scenario.as_deref(), controller.as_deref());
+    let saved = args.saved.open(&args.dir)?;
+    let case_of = |sample: u64| Case::of(&saved, scenario, sample, controller).map_err(CausesError::from);
+    // Without --nearest, the command line has a sample.
+    let (case, search) = match *sample {
+        Some(sample) if !args.nearest => (case_of(sample)?, None),
+        sample => {
+            let search = NearestSearch::of(&saved, scenario, sample, controller)?;
+            (search.case().clone(), Some(search))
+        }
+    };
     saved.folder().check_journal()?;
-    let paths = output_files(&case, args.output.as_deref())?;
-    protect(&of_campaign(&args.saved_sample.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
-    let minimized = minimize_sample(&saved, &case)?;
+    let of_nearest = search.as_ref().map(|_| PathBuf::from(format!("{}-nearest.toml", case.file.config().name)));
+    let paths = output_files(&case, args.output.as_deref().or(of_nearest.as_deref()))?;
+    protect(&of_campaign(&args.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
+    let minimized = match search {
+        Some(search) => search.run(&saved, args.runs.unwrap_or(NEAREST_RUNS))?,
+        None => minimize_sample(&saved, &case)?,
+    };
     let files = write_files(&case, &minimized, &paths, command_for)?;
     match args.format {
         Format::Json => {

@@ -132,7 +132,7 @@ enum Command {
     /// system did
     Explain(causes::ExplainArgs),
     /// Find the smallest failing case near a failing sample of a campaign, and the nearest case
-    /// that passes
+    /// that passes; with --nearest, the failing case nearest to the nominal one
     Minimize(causes::MinimizeArgs),
     /// Explore the samples of a campaign in the browser, and open recordings in the installed Rerun
     /// viewer

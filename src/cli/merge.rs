@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::merge::Parts;
+use closecall_campaign::rare::RareParts;
 use closecall_campaign::saved::{SavedCampaign, works};
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
@@ -21,6 +22,7 @@ use super::fast_samples::FastParts;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_text};
+use super::rare::{Rare, RareArgs};
 use super::results::{ArtifactArgs, print_results, remember, selection};
 use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
@@ -59,7 +61,40 @@ pub(super) struct MergeArgs {
     format: Format,
 }
 
+/// Merges the parts of a campaign that samples a rare event. Nothing runs.
+fn merge_rare(args: &MergeArgs, parts: &RareParts) -> Result<ExitCode, CliError> {
+    let is_named = [
+        (args.record.is_some(), "--record"),
+        (args.gates.names_criterion()?, "a gate other than --max-probability"),
+        (args.artifacts.is_named(), "--strict-artifacts"),
+    ];
+    if let Some((_, option)) = is_named.into_iter().find(|(is_named, _)| *is_named) {
+        return Err(CliError::usage(format!(
+            "the runs of a rare event are no independent samples of the scenario: their parts cannot be merged with {option}"
+        )));
+    }
+    let (gate, manifest) = (args.gates.probability()?, parts.manifest());
+    let works = works(&args.parts[0], &manifest.campaign)?;
+    let reports = parts.estimate(&works)?;
+    let folder = parts.write(&args.out, session::arguments(), args.resume)?;
+    let rare = Rare {
+        method: manifest.method,
+        args: &RareArgs::default(),
+        budget: Some(manifest.budget),
+        gate,
+        ray: None,
+        folder: Some(&args.out),
+        resume: args.resume,
+        format: args.format,
+        can_draw_seed: false,
+    };
+    rare.conclude(&reports, &works, &manifest.campaign, Some(&folder))
+}
+
 pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
+    if let Some(parts) = RareParts::open(&args.parts)? {
+        return merge_rare(args, &parts);
+    }
     let parts = Parts::open(&args.parts)?;
     let mut is_trusted = true;
     for part in &args.parts {

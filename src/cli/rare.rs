@@ -11,6 +11,8 @@ use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::arguments::positive;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::interrupt::Signal;
+use closecall_campaign::manifest::Manifest;
+use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::rare::{
@@ -27,6 +29,7 @@ use closecall_sensors::SensorMode;
 use closecall_studies::case::Case;
 use closecall_studies::minimize::{MinimizedText, minimize, output_files, write_files};
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 use super::CliError;
@@ -177,7 +180,7 @@ impl Rare<'_> {
         let goal = Goal {
             relative_width: self.args.relative_width.unwrap_or(RELATIVE_WIDTH),
             budget: self.budget.unwrap_or(if self.method == Method::Search { SEARCH_BUDGET } else { BUDGET }),
-            value: if nearness.expression().second.is_some() { 2 } else { 0 },
+            value: nearness.value(),
         };
         let manifest = RareManifest {
             method: self.method,
@@ -188,47 +191,84 @@ impl Rare<'_> {
             campaign: plan.manifest(session::arguments())?,
         };
         let remote = connect_points(self.ray, &manifest.campaign).map_err(CampaignError::from)?;
-        let rare = RarePlan { method: self.method, nearness, goal, workers: campaign.workers, remote };
+        let (method, workers, part) = (self.method, campaign.workers, plan.partition);
+        let rare = RarePlan { method, nearness, goal, workers, remote, part };
         let folder = self.folder.map(|path| RareFolder::lock(path, &manifest, self.resume)).transpose()?;
         let mut journal = folder.as_ref().map(RareFolder::journal).transpose()?;
         let mut stop = campaign.stop.clone();
         session::stop_on_request(&mut stop);
         let bar = progress_bar(goal.budget.saturating_mul(campaign.works.len() as u64));
         let _heartbeat = heartbeat(&bar);
-        let mut reports = Vec::new();
+        let (mut reports, mut runs_of_part) = (Vec::new(), Vec::new());
         for work in campaign.works.iter().enumerate() {
             match rare.run(work, journal.as_mut(), &stop, &mut || bar.inc(1)) {
                 Ok(report) => reports.push(report),
+                Err(RareError::PartEnds { runs }) => runs_of_part.push((work.1.file.config().name.clone(), runs)),
                 Err(RareError::Stopped) => return Ok(self.stopped(&bar)),
                 Err(RareError::Campaign(error)) => return Err(error.into()),
-                Err(error @ RareError::NothingVaries { .. }) => return Err(CliError::usage(error.to_string())),
-            }
-        }
-        bar.finish_and_clear();
-        // A search has no gate, and judges by its exit code.
-        let judges = self.gate.is_some() || self.method == Method::Search;
-        let remark = known_seed(judges, &manifest.campaign, self.can_draw_seed);
-        let seed = campaign.works.first().map(|work| work.sampling.seed);
-        let result = self.json(&reports, seed, remark.as_deref());
-        if let Some(folder) = &folder {
-            print_written(&folder.write(&result)?);
-        }
-        match self.format {
-            Format::Json => outln!("{result:#}"),
-            Format::Human => {
-                self.print(&reports, &campaign.works, plan.sensors);
-                remark.iter().for_each(|remark| outln!("  {remark}"));
-                if manifest.campaign.has_drawn_seed {
-                    outln!("  drawn for this campaign: --seed {}", manifest.campaign.sampling.seed);
+                Err(error @ (RareError::NothingVaries { .. } | RareError::MissingRun { .. })) => {
+                    return Err(CliError::usage(error.to_string()));
                 }
             }
         }
+        bar.finish_and_clear();
+        if let Some(part) = part {
+            self.print_part(part, &runs_of_part, manifest.campaign.sampling.seed);
+            return Ok(ExitCode::Pass);
+        }
+        let code = self.conclude(&reports, &campaign.works, &manifest.campaign, folder.as_ref())?;
         if self.method == Method::Search {
             for (report, work) in reports.iter().zip(&campaign.works) {
                 self.minimize(report, work, nearness.expression())?;
             }
         }
+        Ok(code)
+    }
+
+    /// Prints the estimates, and writes them into the folder.
+    pub(super) fn conclude(
+        &self,
+        reports: &[RareReport],
+        works: &[Arc<Work>],
+        manifest: &Manifest,
+        folder: Option<&RareFolder>,
+    ) -> Result<ExitCode, CliError> {
+        // A search has no gate, and judges by its exit code.
+        let judges = self.gate.is_some() || self.method == Method::Search;
+        let remark = known_seed(judges, manifest, self.can_draw_seed);
+        let seed = works.first().map(|work| work.sampling.seed);
+        let result = self.json(reports, seed, remark.as_deref());
+        if let Some(folder) = folder {
+            print_written(&folder.write(&result)?);
+        }
+        match self.format {
+            Format::Json => outln!("{result:#}"),
+            Format::Human => {
+                self.print(reports, works, manifest.sensors);
+                remark.iter().for_each(|remark| outln!("  {remark}"));
+                if manifest.has_drawn_seed {
+                    outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
+                }
+            }
+        }
         Ok(ExitCode::first_of(reports.iter().map(|report| self.code(report))))
+    }
+
+    /// Says what a part of the campaign holds, which has no estimate of its own.
+    fn print_part(&self, part: Partition, runs: &[(String, u64)], seed: u64) {
+        match self.format {
+            Format::Json => {
+                let scenarios = runs.iter().map(|(scenario, runs)| json!({ "scenario": scenario, "runs": runs }));
+                let scenarios: Vec<Value> = scenarios.collect();
+                outln!("{:#}", stamped(json!({ "partition": part, "scenarios": scenarios }), Some(seed), None));
+            }
+            Format::Human => {
+                for (scenario, runs) in runs {
+                    outln!("{scenario}: part {part} of a campaign by {}, {}", self.method, counted(*runs, "run"));
+                }
+                outln!("  no estimate: `closecall tool merge` makes it of all parts");
+            }
+        }
     }
 
     /// Says that a signal has ended the runs.
@@ -258,12 +298,19 @@ impl Rare<'_> {
             return ExitCode::SampleError;
         }
         if let Some(search) = report.search {
-            return if search.has_event { ExitCode::Fail } else { ExitCode::Pass };
+            return match search.has_event {
+                true => ExitCode::Fail,
+                // An event that cannot happen is not found either.
+                false if !report.not_judged.is_empty() => ExitCode::Inconclusive,
+                false => ExitCode::Pass,
+            };
         }
         match (&self.gate, report.main()) {
-            (Some(_), _) => self
-                .judge(report)
-                .map_or(ExitCode::Inconclusive, |passes| if passes { ExitCode::Pass } else { ExitCode::Fail }),
+            (Some(_), _) => match self.judge(report) {
+                Some(true) if report.not_judged.is_empty() => ExitCode::Pass,
+                Some(false) => ExitCode::Fail,
+                Some(true) | None => ExitCode::Inconclusive,
+            },
             (None, Some(_)) => ExitCode::Pass,
             (None, None) => ExitCode::Inconclusive,
         }
@@ -287,6 +334,7 @@ impl Rare<'_> {
     fn word(&self, report: &RareReport) -> &'static str {
         match self.judge(report) {
             _ if report.errors > 0 => "ERROR",
+            Some(true) if !report.not_judged.is_empty() => "NOT JUDGED",
             Some(true) => "PASS",
             Some(false) => "FAIL",
             None => "INCONCLUSIVE",

@@ -187,6 +187,16 @@ impl StudyArgs {
     }
 }
 
+/// Refuses keys that an option varies and `--set` fixes: the study would undo the setting.
+fn refuse_set<'a>(file: &ScenarioFile, option: &str, mut keys: impl Iterator<Item = &'a str>) -> Result<(), CliError> {
+    match keys.find_map(|key| Some((key, file.undone_by(key)?))) {
+        Some((key, set)) => Err(CliError::usage(format!(
+            "{option} {key} gives values to a key that --set {set} fixes: leave one of them out"
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// Runs a study of this many steps with a progress bar; `None` if a signal has ended it.
 fn run<T, E>(
     steps: u64,
@@ -226,6 +236,7 @@ fn print(study: Option<Study>, format: Format, folder: Option<&Path>) -> Result<
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
     let (study, number) = (&args.study, |count: u64| usize::try_from(count).unwrap_or(usize::MAX));
     let (file, sensors, named) = (study.file()?, study.sensors.map(SensorsChoice::mode), args.factors.clone());
+    refuse_set(&file, "--factor", named.iter().map(|range| range.key.as_str()))?;
     let mut plan = SensitivityPlan::new(&file, &study.controllers(&file)?, sensors, named, !args.no_default_factors)?;
     plan.method = args.method;
     (plan.trajectories, plan.rows, plan.top) = (number(args.trajectories), number(args.rows), number(args.top));
@@ -245,6 +256,7 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
         }
     }
     let grid = if args.vary.is_empty() { FrontierPlan::default_grid(&file) } else { args.vary.clone() };
+    refuse_set(&file, "--vary", grid.iter().map(|grid| grid.key.as_str()))?;
     let sampling = Sampling { seed: study.seed, design: Design::Random, samples: args.samples };
     let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), Workers::with_jobs(study.jobs));
     let controllers = study.controllers(&file)?;
@@ -260,6 +272,7 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
 pub(super) fn boundary(args: &BoundaryArgs) -> Result<ExitCode, CliError> {
     let study = &args.study;
     let (file, sensors) = (study.file()?, study.sensors.map(SensorsChoice::mode));
+    refuse_set(&file, "--along", args.along.iter().map(|axis| axis.key.as_str()))?;
     let mut plan = BoundaryPlan::new(&file, &args.along, args.event, &study.controllers(&file)?, sensors)?;
     plan.budget = usize::try_from(args.runs).unwrap_or(usize::MAX);
     (plan.seed, plan.sample, plan.workers) = (study.seed, args.sample, Workers::with_jobs(study.jobs));

@@ -85,6 +85,17 @@ pub enum CausesError {
         /// Samples with an outcome without the system.
         runs: u64,
     },
+    /// No vehicle collides in any sample.
+    #[error(
+        "no sample of `{scenario}` fails with `{controller}`: no vehicle collides; `closecall campaign --design search` looks \
+         for a first case"
+    )]
+    NoFailure {
+        /// The scenario.
+        scenario: String,
+        /// The controller.
+        controller: String,
+    },
     /// No vehicle collides in the sample.
     #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples are {failing}")]
     Passes {
@@ -114,9 +125,11 @@ impl CausesError {
             Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
             Self::Scenario(_) => FailureKind::InvalidInput,
             Self::Sample { .. } | Self::NotRepeated { .. } | Self::NotReduced { .. } => FailureKind::Sample,
-            Self::Passes { .. } | Self::Foreign { .. } | Self::OtherEncounter { .. } | Self::Setting(_) => {
-                FailureKind::Usage
-            }
+            Self::Passes { .. }
+            | Self::NoFailure { .. }
+            | Self::Foreign { .. }
+            | Self::OtherEncounter { .. }
+            | Self::Setting(_) => FailureKind::Usage,
         }
     }
 }

@@ -121,6 +121,98 @@ fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
     }
 }
 
+/// A scenario in which vehicles collide if and only if one parameter, a gap of 17.5 m ± 5 m, is below
+/// 10 m, and which has a second parameter that changes nothing.
+fn gap_scenario(parent: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(Path::new(ROOT).join("tests/fixtures/known-rare-probability.toml")).unwrap();
+    let unneeded = "[parameters]\npaint = { uniform = { min = 0.2, max = 0.8 } }";
+    let text = text.replace("mean = 30.0", "mean = 17.5").replace("[parameters]", unneeded).replace(
+        "vehicle = { class = \"car\" }\nstart = { behind",
+        "vehicle = { class = \"car\", paint-reflectivity = \"$paint\" }\nstart = { behind",
+    );
+    assert!(text.contains("mean = 17.5") && text.contains("$paint"), "{text}");
+    let path = parent.join("gap.toml");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn the_nearest_failure_is_at_the_known_distance_of_the_boundary() {
+    let parent = folder();
+    let (scenario, out) = (gap_scenario(parent.path()), parent.path().join("out"));
+    let (scenario, dir) = (scenario.to_str().unwrap(), out.to_str().unwrap());
+    let words = ["campaign", scenario, "-n", "200", "--seed", SEED, "--controller", "acc", "--no-gate", "--out", dir];
+    stdout(&closecall(words), 0);
+    let file = parent.path().join("nearest.toml");
+    let words = ["minimize", dir, "--nearest", "--out", file.to_str().unwrap()];
+    let result = json(&closecall(words.into_iter().chain(["--format", "json"])), 0);
+    let minimized = &result["minimized"];
+    // P(gap < 10 m) = (Φ(−1.5) − Φ(−3.3))/(Φ(8.5) − Φ(−3.3)) = 0.06636, hence β = 1.5035.
+    let distance_sd = minimized["distance_sd"].as_f64().unwrap();
+    assert!((1.5030..1.510).contains(&distance_sd), "{minimized:#}");
+    let off = minimized["off_nominal"].as_array().unwrap();
+    assert_eq!(off.len(), 1, "the paint is not needed: {minimized:#}");
+    assert_eq!(off[0]["name"], "gap-m");
+    // The nominal gap is the median of the truncated distribution, 17.503 m.
+    let difference = off[0]["difference"].as_f64().unwrap();
+    assert!((-7.6..-7.5).contains(&difference), "{minimized:#}");
+    assert!((off[0]["distance_sd"].as_f64().unwrap() + distance_sd).abs() < 1e-6, "{minimized:#}");
+    let nearest = &minimized["nearest"];
+    assert!(nearest["runs"].as_u64().unwrap() <= nearest["most_runs"].as_u64().unwrap(), "{nearest:#}");
+    assert!(nearest["starts"].as_u64().unwrap() <= nearest["failing"].as_u64().unwrap(), "{nearest:#}");
+    assert_eq!(nearest["has_converged"], true);
+    let run = |file: &str| {
+        number_of_collisions(&json(&closecall(["run", file, "--controller", "acc", "--format", "json"]), 0))
+    };
+    assert!(run(file.to_str().unwrap()) > 0);
+    assert_eq!(run(result["files"]["twin"].as_str().unwrap()), 0);
+    // In words, and again to the same bytes.
+    let text = stdout(&closecall(words), 0);
+    assert!(text.contains("the nearest failure found is 1.50 standard deviations from the nominal case"), "{text}");
+    assert!(
+        text.contains("m less, -1.50 standard deviations") && text.contains("a nearer failure may exist"),
+        "{text}"
+    );
+    assert_eq!(stdout(&closecall(words), 0), text);
+}
+
+#[test]
+fn the_nearest_failure_of_several_parameters_fails_and_stays_within_its_runs() {
+    let parent = folder();
+    let path = campaign(parent.path(), "usual", 200, &[]);
+    let sample = failing(&path).first().unwrap().to_string();
+    let file = parent.path().join("nearest.toml");
+    let (dir, name) = (path.to_str().unwrap(), file.to_str().unwrap());
+    let all = json(&closecall(["minimize", dir, "--nearest", "-n", "600", "--out", name, "--format", "json"]), 0);
+    let run = |file: &str| number_of_collisions(&json(&closecall(["run", file, "--format", "json"]), 0));
+    assert!(run(name) > 0, "{all:#}");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains("The nearest failure that a search has found: "), "{text}");
+    assert!(all["minimized"]["nearest"]["runs"].as_u64().unwrap() <= 600, "{all:#}");
+    // One sample alone is one start.
+    let one = json(&closecall(["minimize", dir, &sample, "--nearest", "--out", name, "--format", "json"]), 0);
+    assert_eq!(one["minimized"]["sample"].to_string(), sample);
+    let counts = ["starts", "failing"].map(|key| one["minimized"]["nearest"][key].as_u64().unwrap());
+    assert_eq!(counts, [1, 1]);
+}
+
+#[test]
+fn a_nearest_failure_needs_a_failing_sample() {
+    let parent = folder();
+    let (scenario, out) = (gap_scenario(parent.path()), parent.path().join("out"));
+    let dir = out.to_str().unwrap();
+    let words = ["campaign", scenario.to_str().unwrap(), "-n", "5", "--set", "gap-m=30", "--no-gate", "--out", dir];
+    stdout(&closecall(words), 0);
+    let none = closecall(["minimize", dir, "--nearest"]);
+    assert_eq!(code(&none), 2);
+    assert!(message(&none).contains("no sample of `known-rare-probability` fails with `mis`"), "{}", message(&none));
+    let passes = closecall(["minimize", dir, "3", "--nearest"]);
+    assert!(message(&passes).contains("sample 3 does not fail with `mis`"), "{}", message(&passes));
+    for words in [vec!["minimize", dir], vec!["minimize", dir, "3", "--runs", "5"]] {
+        assert_eq!(code(&closecall(words)), 2);
+    }
+}
+
 #[test]
 fn a_minimized_case_of_another_controller_names_it_and_no_foreign_file_is_overwritten() {
     let parent = folder();

@@ -140,7 +140,13 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
         ("--design subset --event collision --gate count(ego_collided)<=0", "a gate other than --max-probability"),
         ("--design subset --event collision --max-collisions 3", "a gate other than --max-probability"),
         ("--design subset --event collision --preset pr", "--preset"),
-        ("--design subset --event collision --partition 1/2 --out unused", "--partition"),
+        ("--design subset --event collision --partition 1/2 --out unused", "--design subset has no parts"),
+        ("--design search --event collision --partition 1/2 --out unused", "--design search has no parts"),
+        ("--design importance --event collision --partition 1/2", "--out"),
+        (
+            "--design importance --event collision --partition 1/2 --out unused --max-probability 0.1",
+            "a part has no estimate",
+        ),
         ("--design subset --event collision --fail-fast", "--fail-fast"),
         ("--design subset --event collision --until-certain --max-probability 0.1", "--until-certain"),
         ("--design subset --event collision --time-budget 9s", "--time-budget"),
@@ -167,6 +173,86 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
     let fixed = rare("--design importance --event collision --set gap-m=20");
     assert_eq!(code(&fixed), 2);
     assert!(message(&fixed).contains("no parameter of `known-rare-probability` varies"), "{}", message(&fixed));
+}
+
+#[test]
+fn parts_of_weighted_runs_merge_to_the_bytes_of_one_machine() {
+    let place = folder();
+    let at = |name: &str| place.path().join(name).to_str().unwrap().to_owned();
+    let run = |more: &str| rare(&format!("{BY_IMPORTANCE} --seed 3 {more}"));
+    let whole = stdout(&run(&format!("--out {}", at("whole"))), 0);
+    let parts = [1, 2, 3].map(|part| at(&format!("part-{part}")));
+    for (number, part) in (1..).zip(&parts) {
+        let value = json(&run(&format!("--partition {number}/3 --jobs {number} --out {part}")), 0);
+        assert_eq!(value["partition"], format!("{number}/3"));
+        assert!(!Path::new(part).join("rare.json").exists(), "a part has no estimate");
+    }
+    let lines = |path: &str| fs::read_to_string(Path::new(path).join("rare-journal.jsonl")).unwrap().lines().count();
+    let counts = parts.each_ref().map(|part| lines(part));
+    let of_whole = lines(&at("whole"));
+    assert!(counts.iter().all(|count| *count < of_whole), "{counts:?} of {of_whole}");
+    // Each last run is in one part, and all others are in every part.
+    let common = (counts.iter().sum::<usize>() - of_whole) / 2;
+    assert!(common > 800 && of_whole - common >= 600, "{common} common runs of {of_whole}");
+    let merge = |parts: &[&str], out: &str, more: &str| {
+        let words = ["tool", "merge", "--format", "json", "--out", out];
+        closecall(words.into_iter().chain(parts.iter().copied()).chain(more.split_whitespace()))
+    };
+    let [first, second, third] = parts.each_ref().map(String::as_str);
+    let merged = at("merged");
+    assert_eq!(stdout(&merge(&[third, first, second], &merged, ""), 0), whole);
+    let bytes = |path: &str, file: &str| fs::read(Path::new(path).join(file)).unwrap();
+    for file in ["rare.json", "rare-journal.jsonl"] {
+        assert!(bytes(&merged, file) == bytes(&at("whole"), file), "{file}");
+    }
+    // The merged runs are judged as those of one machine.
+    let verdict = |max: &str| {
+        code(&merge(&[first, second, third], &at(&format!("judged-{max}")), &format!("--max-probability {max}")))
+    };
+    assert_eq!([verdict("1e-4"), verdict("1e-6")], [0, 1]);
+    let refused = |parts: &[&str], more: &str| {
+        let output = merge(parts, &at("refused"), more);
+        assert_eq!(code(&output), 2, "{}", stderr(&output));
+        message(&output)
+    };
+    assert!(refused(&[first, third], "").contains("a part of 3 missing: 2/3"));
+    assert!(refused(&[first, second, second], "").contains("both hold part 2/3"));
+    assert!(refused(&[first, second, &at("whole")], "").contains("holds a whole campaign"));
+    assert!(refused(&[first, second, third], "--record worst:1").contains("cannot be merged with --record"));
+    let other = at("other");
+    json(&rare(&format!("{BY_IMPORTANCE} --seed 4 --partition 3/3 --out {other}")), 0);
+    assert!(refused(&[first, second, &other], "").contains("different campaigns"));
+    // A part that was killed is named, and resumed.
+    let journal = Path::new(second).join("rare-journal.jsonl");
+    let kept = fs::read(&journal).unwrap();
+    fs::write(&journal, &kept[..kept.len() - 40]).unwrap();
+    assert!(refused(&[first, second, third], "").contains("a part has not run to its end"));
+    stdout(&run(&format!("--partition 2/3 --resume --out {second}")), 0);
+    assert_eq!(fs::read(&journal).unwrap(), kept);
+}
+
+#[test]
+fn an_event_that_cannot_happen_is_not_judged() {
+    let run = |words: &str| {
+        let words = format!("campaign low-thw-overtake --sensors object --event collision {words}");
+        closecall(words.split_whitespace())
+    };
+    // After 2 s no vehicle has come near, and nothing can collide.
+    for method in ["importance", "subset"] {
+        let text = stdout(&run(&format!("--design {method} -n 3000 --max-probability 0.1 --set duration-s=2")), 4);
+        if method == "importance" {
+            assert!(text.contains("NOT JUDGED: 1.000e-1 allowed"), "{text}");
+        }
+        assert!(text.contains("what the scenario is about did not happen: low-thw-overtake: lead_braked"), "{text}");
+    }
+    let value = json(&run("--design importance -n 3000 --max-probability 0.1 --set duration-s=2 --format json"), 4);
+    assert_eq!(value["gate"]["verdicts"][0], "NOT JUDGED");
+    assert!(value["scenarios"][0]["not_judged"][0].as_str().unwrap().contains("at least 95.0 % expected"), "{value}");
+    let search = stdout(&run("--design search -n 300 --set duration-s=2"), 4);
+    assert!(search.contains("not found") && search.contains("did not happen"), "{search}");
+    // As it is, the scenario is about what it says, and a limit that is too low still fails.
+    let value = json(&run("--design importance -n 3000 --max-probability 0.9 --format json"), 0);
+    assert_eq!(value["scenarios"][0]["not_judged"].as_array().unwrap().len(), 0, "{value}");
 }
 
 #[test]

@@ -134,6 +134,13 @@ fn a_factor_that_cannot_be_used_is_refused_by_name() {
     }
     let twice = ["--factor", "duration-s=50..60", "--factor", "duration-s=40..60"];
     assert!(message(&closecall(study(&twice))).contains("duration-s is given twice"));
+    let undone = closecall(study(&["--factor", "closing-mps=3..9"]));
+    assert_eq!(code(&undone), 2);
+    assert!(message(&undone).contains("--set closing-mps=8.4 fixes"), "{}", message(&undone));
+    let vary = ["study", "frontier", "low-thw-overtake", "--vary", "brake-mps2=5,6", "--set", "brake-mps2=6"];
+    let undone = closecall(vary);
+    assert_eq!(code(&undone), 2);
+    assert!(message(&undone).contains("--vary brake-mps2 gives values to a key"), "{}", message(&undone));
     let refused =
         closecall(["study", "frontier", "low-thw-overtake", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,99"]);
     assert_eq!(code(&refused), 3);

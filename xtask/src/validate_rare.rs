@@ -165,7 +165,7 @@ fn of_scenario(method: Method, repetitions: u64) -> Result<Total, Box<dyn std::e
     let arms = vec![Arm { controller: BuiltIn::Acc.factory(), sensors: None }];
     let goal = Goal { relative_width: WIDTH, budget: 2_000_000, value: 0 };
     let nearness = Nearness::new("collision".parse()?, None)?;
-    let plan = RarePlan { method, nearness, goal, workers: Workers::default(), remote: None };
+    let plan = RarePlan { method, nearness, goal, workers: Workers::default(), remote: None, part: None };
     let mut total = Total::default();
     for seed in 0..repetitions {
         let sampling = Sampling { seed, design: Design::Random, samples: 1 };

@@ -17,6 +17,9 @@ const SMALLEST_PROBABILITY: f64 = 0.01;
 /// Share of the first runs whose sign has to be predicted: an assumption; 70 to 90 % are plausible. Half
 /// of the signs of noise are predicted.
 const SMALLEST_START_SHARE: f64 = 0.8;
+/// Share of the runs that may be without a value: an assumption; 5 to 25 % are plausible. A surface
+/// says nothing about places where the number does not exist, and draws a boundary through them.
+const LARGEST_WITHOUT_VALUE: f64 = 0.1;
 /// Share of the area that may be undecided: an assumption; 20 to 50 % are plausible.
 const LARGEST_UNDECIDED: f64 = 0.5;
 
@@ -48,6 +51,13 @@ pub enum Doubt {
     StartSigns(LeaveOneOut),
     /// Too much of the area is undecided.
     Undecided(Area),
+    /// Too many runs have no value.
+    WithoutValue {
+        /// The number of such runs.
+        without: usize,
+        /// The number of all runs.
+        runs: usize,
+    },
     /// The event happens in runs whose margin is 0: their sign does not say so.
     OnBound {
         /// The number of such runs.
@@ -80,6 +90,11 @@ impl fmt::Display for Doubt {
                 "{} of the area is undecided; at most {} is allowed",
                 percent(area.undecided),
                 percent(LARGEST_UNDECIDED)
+            ),
+            Self::WithoutValue { without, runs } => write!(
+                f,
+                "{without} of {runs} runs have no value, and the surface says nothing about their places; at most {} is allowed",
+                percent(LARGEST_WITHOUT_VALUE)
             ),
             Self::OnBound { on_bound, runs } => write!(
                 f,
@@ -121,7 +136,17 @@ impl LeaveOneOut {
     }
 }
 
+/// Returns a reason to doubt a surface if too many of the runs have no value.
+pub(super) fn without_value(without: usize, runs: usize) -> Option<Doubt> {
+    let few = without as f64 <= LARGEST_WITHOUT_VALUE * runs as f64;
+    (!few).then_some(Doubt::WithoutValue { without, runs })
+}
+
 /// Returns the probability of at most `count` of independent events with these probabilities.
+///
+/// That the signs of left-out runs are independent is an assumption. Neighbouring runs are predicted
+/// from each other, so that their errors go together, and the number of signs scatters more than
+/// here: the check doubts a right surface more often than [`SMALLEST_PROBABILITY`] says.
 fn at_most(count: usize, probabilities: &[f64]) -> f64 {
     let mut of_counts = vec![1.0];
     for probability in probabilities {
@@ -184,6 +209,15 @@ mod tests {
         assert!((at_most(1, &[0.5; 3]) - 0.5).abs() < 1e-12);
         assert!((at_most(3, &[0.2; 3]) - 1.0).abs() < 1e-12);
         assert!((at_most(0, &[0.1, 0.4]) - 0.54).abs() < 1e-12);
+    }
+
+    #[test]
+    fn runs_without_a_value_are_a_doubt_if_they_are_more_than_a_tenth() {
+        assert_eq!(without_value(0, 60), None);
+        assert_eq!(without_value(6, 60), None);
+        assert_eq!(without_value(7, 60), Some(Doubt::WithoutValue { without: 7, runs: 60 }));
+        let doubt = without_value(31, 60).unwrap().to_string();
+        assert!(doubt.starts_with("31 of 60 runs have no value") && doubt.contains("at most 10 %"), "{doubt}");
     }
 
     #[test]

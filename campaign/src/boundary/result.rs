@@ -1,10 +1,10 @@
 //! The result of a boundary.
 
-use super::check::{Doubt, LeaveOneOut};
+use super::check::{Doubt, LeaveOneOut, without_value};
 use super::plan::BoundaryPlan;
 use super::search::{START_RUNS, Searched};
 use super::slices::{Area, Map, Slice, map, slices};
-use super::surface::FEWEST;
+use super::surface::{FEWEST, are_equal};
 use crate::sensitivity::RunErrors;
 
 /// A boundary along two parameters.
@@ -34,6 +34,8 @@ pub struct Boundary {
     pub errors: RunErrors,
     /// The surface; `None` if the runs have none.
     pub surveyed: Option<Surveyed>,
+    /// Whether the number is the same in all runs that have it.
+    has_equal_values: bool,
 }
 
 /// One run.
@@ -60,6 +62,9 @@ pub struct Surveyed {
     pub map: Map,
     /// Each run predicted from the others.
     pub check: LeaveOneOut,
+    /// Standard deviation with which single runs scatter about the surface, in the unit of the number.
+    /// Slices, area and map leave it out: they are those of the surface.
+    pub noise_sd: f64,
     /// The reasons to doubt the surface.
     pub doubts: Vec<Doubt>,
 }
@@ -77,6 +82,7 @@ impl Boundary {
         };
         let runs: Vec<Ran> = searched.points.iter().zip(values).enumerate().map(ran).collect();
         let surveyed = surveyed(searched, &runs, ranges);
+        let has_equal_values = are_equal(&searched.margins.iter().flatten().copied().collect::<Vec<_>>());
         Self {
             scenario: plan.file.config().name.clone(),
             seed: plan.seed,
@@ -90,6 +96,7 @@ impl Boundary {
             runs,
             errors,
             surveyed,
+            has_equal_values,
         }
     }
 
@@ -107,7 +114,10 @@ impl Boundary {
     pub fn absent(&self) -> String {
         match self.runs_with_value() {
             few if few < FEWEST => format!("{few} runs have a value of `{}`; {FEWEST} are required", self.quantity),
-            _ => format!("`{}` has the same value in all runs: it depends on neither parameter", self.quantity),
+            _ if self.has_equal_values => {
+                format!("`{}` has the same value in all runs: it depends on neither parameter", self.quantity)
+            }
+            _ => format!("no surface could be fitted to the values of `{}`: they are too different", self.quantity),
         }
     }
 }
@@ -120,7 +130,9 @@ fn surveyed(searched: &Searched, runs: &[Ran], ranges: [[f64; 2]; 2]) -> Option<
     let mut doubts = check.doubts(area);
     let on_bound = on_bound(runs, &searched.margins);
     doubts.extend((on_bound > 0).then_some(Doubt::OnBound { on_bound, runs: margins.len() }));
-    Some(Surveyed { slices: slices(&surface, ranges), area, map, check, doubts })
+    doubts.extend(without_value(runs.len() - margins.len(), runs.len()));
+    let noise_sd = surface.noise_sd();
+    Some(Surveyed { slices: slices(&surface, ranges), area, map, check, noise_sd, doubts })
 }
 
 /// Returns the number of runs in which the event happens with a margin of 0. A smallest gap is 0 in

@@ -149,6 +149,22 @@ fn best(candidates: impl Iterator<Item = Candidate>) -> Option<Candidate> {
 /// Share of the largest margin below which margins differ by rounding alone.
 const ROUNDING: f64 = 1e-12;
 
+/// Returns true if margins are all equal but for rounding.
+pub(super) fn are_equal(margins: &[f64]) -> bool {
+    spread(margins).is_none()
+}
+
+/// Returns the mean and the standard deviation of margins; `None` if they are all equal but for
+/// rounding. Both may be infinite.
+fn spread(margins: &[f64]) -> Option<[f64; 2]> {
+    let count = margins.len() as f64;
+    let mean = margins.iter().sum::<f64>() / count;
+    let scale = (margins.iter().map(|margin| (margin - mean) * (margin - mean)).sum::<f64>() / count).sqrt();
+    let largest = margins.iter().fold(0.0_f64, |largest, margin| largest.max(margin.abs()));
+    // A scale that is not a number is not small.
+    (!(scale <= ROUNDING * largest)).then_some([mean, scale])
+}
+
 /// Smallest variance of a prediction (standard deviations of the margins, squared): rounding makes
 /// some negative.
 const SMALLEST_VARIANCE: f64 = 1e-16;
@@ -167,13 +183,7 @@ impl Surface {
         if points.len() < FEWEST || margins.len() != points.len() {
             return None;
         }
-        let count = margins.len() as f64;
-        let mean = margins.iter().sum::<f64>() / count;
-        let scale = (margins.iter().map(|margin| (margin - mean) * (margin - mean)).sum::<f64>() / count).sqrt();
-        let largest = margins.iter().fold(0.0_f64, |largest, margin| largest.max(margin.abs()));
-        if !(scale > ROUNDING * largest && scale.is_finite()) {
-            return None;
-        }
+        let [mean, scale] = spread(margins).filter(|spread| spread.iter().all(|number| number.is_finite()))?;
         let values: Vec<f64> = margins.iter().map(|margin| margin / scale).collect();
         let candidate = |ratio, noise| {
             let start = Shape { ratio, noise, kernel: Matern1::default(), mean: mean / scale };
@@ -195,6 +205,12 @@ impl Surface {
             return Vec::new();
         }
         self.in_unit(predict(&self.process, self.shape.stretched(points), 0.0))
+    }
+
+    /// Returns the standard deviation with which single runs scatter about the surface, in the unit of
+    /// the margin. [`Self::predict`] does not contain it, [`Self::leave_one_out`] does.
+    pub(super) fn noise_sd(&self) -> f64 {
+        self.shape.noise.abs() * self.scale
     }
 
     /// Predicts the margin of each run from the others.
@@ -237,6 +253,8 @@ mod tests {
         let [at_run, outside] = surface.predict(&[points[0], [3.0, 3.0]])[..] else { panic!("two predictions") };
         assert!(outside.sd > 10.0 * at_run.sd);
         assert_eq!(surface.leave_one_out().len(), 30);
+        // The margins are smooth: they do not scatter.
+        assert!((0.0..1.0).contains(&surface.noise_sd()), "{}", surface.noise_sd());
     }
 
     #[test]
@@ -246,6 +264,10 @@ mod tests {
         // The mean of these numbers is rounded, and differs from each of them.
         assert!(Surface::fit(&points(60), &[-0.1; 60]).is_none());
         assert!(Surface::fit(&points(20), &[0.0; 20]).is_none());
+        assert!(are_equal(&[-0.1; 60]) && are_equal(&[0.0; 20]) && !are_equal(&[0.1, 0.2]));
+        // Their squares are too large for a number, and they are not equal.
+        let huge: Vec<f64> = (0..20).map(|index| f64::from(index) * 1e300).collect();
+        assert!(Surface::fit(&points(20), &huge).is_none() && !are_equal(&huge));
         let margins: Vec<f64> = (0..20).map(f64::from).collect();
         assert!(Surface::fit(&points(20), &[&margins[..19], &[f64::NAN]].concat()).is_none());
         assert!(Surface::fit(&points(20), &margins).is_some());

@@ -3,17 +3,18 @@
 use std::sync::Arc;
 
 use closecall_scenarios::Function;
-use closecall_scenarios::criteria::{EGO_COLLIDED, Expression, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
+use closecall_scenarios::criteria::{Expression, FlagName, Quantity};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 
-use super::evaluate::{Accumulator, Evaluation, Evidence, value};
+use super::course::{Course, asks_for_action, missing_action};
+use super::evaluate::{Accumulator, Evaluation, Evidence};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
 use crate::coverage::{CoverageCounter, CoverageResult};
 use crate::ledger::Inference;
-use crate::record::{ArmRecord, Record};
+use crate::record::Record;
 use closecall_scenarios::parameters::SpaceEntry;
 use closecall_traffic::ParameterName;
 use closecall_traffic::statistics::format::percent;
@@ -90,7 +91,6 @@ impl Judge {
     pub fn new(works: &[Arc<Work>], set: &GateSet, inference: Inference) -> Self {
         let judged = |work: &Arc<Work>| {
             let config = work.file.config();
-            let of_prevented = |check: &Expression| check.quantity == Quantity::Pair(PairFlag::Prevented);
             Judged {
                 scenario: config.name.clone(),
                 is_varied: is_varied(work.file.space()),
@@ -104,7 +104,7 @@ impl Judge {
                 happened: 0,
                 samples: 0,
                 overridden: config.overridden.iter().cloned().chain(other_baseline(work)).collect(),
-                asks_for_action: config.checks.values().flatten().any(of_prevented),
+                asks_for_action: asks_for_action(config),
                 function: config.function,
                 extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
                 coverage: CoverageCounter::new(work),
@@ -161,14 +161,8 @@ impl Judge {
         let idle = move |judged: &&Judged| {
             judged.asks_for_action && judged.samples > 0 && judged.acted == 0 && is_told(judged)
         };
-        let missing = |judged: &Judged| match judged.function {
-            Function::Mis => "slowed the ego for a vehicle behind",
-            Function::Aeb | Function::Acc | Function::AebWithHuman => "moved the ego otherwise than the baseline",
-        };
-        self.scenarios
-            .iter()
-            .filter(idle)
-            .map(move |judged| (judged.scenario.as_str(), missing(judged), judged.samples))
+        let idle = self.scenarios.iter().filter(idle);
+        idle.map(|judged| (judged.scenario.as_str(), missing_action(judged.function), judged.samples))
     }
 
     /// Returns the values that each scenario samples beyond trajectory data, in words.
@@ -271,37 +265,10 @@ fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String>
 }
 
 impl Judged {
-    /// A run that the ego's collision ended counts as one in which everything happened. Its further
-    /// course is unknown, and the collision itself is no pass.
     fn observe_expectations(&mut self, record: &Record) {
-        if record.arms.iter().any(|arm| arm.result.is_err()) {
-            return;
-        }
+        let Some(Course { happened, acted }) = Course::of(record, &self.expects, self.function) else { return };
         self.samples += 1;
-        let acted = match self.function {
-            Function::Mis => {
-                let slowed =
-                    Measure::named(SLOWED_FOR_REAR).and_then(|measure| value(Quantity::Tested(measure), record));
-                // A journal without the value does not show that the system was idle.
-                slowed != Some(0.0)
-            }
-            Function::Aeb | Function::Acc | Function::AebWithHuman => {
-                let margins = |arm: Option<&ArmRecord>| {
-                    arm.and_then(|arm| arm.result.as_ref().ok()).map(|outcome| outcome.margins)
-                };
-                margins(record.arms.first()) != margins(record.arms.last())
-            }
-        };
-        self.acted += u64::from(acted);
-        let holds = |quantity: Quantity| value(quantity, record) == Some(1.0);
-        let collided = Measure::named(EGO_COLLIDED);
-        let is_paired = record.arms.len() > 1;
-        let happened = self.expects.iter().all(|flag| {
-            let happened_in = |quantity: fn(&'static Measure) -> Quantity| {
-                holds(quantity(flag.measure())) || collided.is_some_and(|collided| holds(quantity(collided)))
-            };
-            happened_in(Quantity::Tested) && (!is_paired || happened_in(Quantity::Baseline))
-        });
         self.happened += u64::from(happened);
+        self.acted += u64::from(acted);
     }
 }

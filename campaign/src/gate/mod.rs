@@ -5,6 +5,7 @@
 //! ```
 
 mod assemble;
+mod course;
 mod evaluate;
 mod judge;
 mod options;
@@ -13,6 +14,7 @@ mod result;
 mod set;
 
 pub use assemble::{AssemblyError, PresetGates};
+pub(crate) use course::{Course, asks_for_action, missing_action};
 pub(crate) use evaluate::value;
 pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
 pub use judge::Judge;

@@ -17,6 +17,20 @@ pub enum RareError {
         /// The scenario.
         scenario: String,
     },
+    /// A part of a campaign has run its share of the last runs.
+    #[error("a part of a campaign has no estimate of its own: `closecall tool merge` makes it of all parts")]
+    PartEnds {
+        /// Number of runs of the scenario that the part holds.
+        runs: u64,
+    },
+    /// A closed journal lacks a run.
+    #[error("run {run} of `{scenario}` is missing: a part has not run to its end; resume it first")]
+    MissingRun {
+        /// The scenario.
+        scenario: String,
+        /// The number of the run.
+        run: u64,
+    },
     /// A request from outside has ended the runs.
     #[error("the runs were stopped")]
     Stopped,

@@ -191,10 +191,20 @@ impl<S: Simulator> Run<'_, S> {
     }
 
     /// Draws and runs points of a mixture.
-    fn draw(&mut self, mixture: &Mixture, count: usize, (part, index): (&str, u64)) -> Result<Drawn, S::Error> {
+    fn draw(&mut self, mixture: &Mixture, count: usize, stream: (&str, u64)) -> Result<Drawn, S::Error> {
+        self.draw_by(S::run, mixture, count, stream)
+    }
+
+    fn draw_by(
+        &mut self,
+        run: fn(&mut S, &[Point]) -> Result<Vec<Response>, S::Error>,
+        mixture: &Mixture,
+        count: usize,
+        (part, index): (&str, u64),
+    ) -> Result<Drawn, S::Error> {
         let mut rng = self.seed.stream(part, index);
         let points: Vec<Point> = (0..count).map(|_| mixture.draw(self.dimensions, &mut rng)).collect();
-        let responses = self.simulator.run(&points)?;
+        let responses = run(self.simulator, &points)?;
         self.runs += count as u64;
         let weights = points.iter().map(|point| 1.0 / mixture.ratio(&point.normals)).collect();
         Ok(Drawn { points, responses, weights })
@@ -355,7 +365,7 @@ fn finish<S: Simulator>(
     mixture: Mixture,
     count: u64,
 ) -> Result<ImportanceResult, S::Error> {
-    let drawn = run.draw(&mixture, usize::try_from(count).unwrap_or(usize::MAX), ("final", 0))?;
+    let drawn = run.draw_by(S::run_last, &mixture, usize::try_from(count).unwrap_or(usize::MAX), ("final", 0))?;
     let all = || drawn.responses.iter().zip(&drawn.weights);
     let column = |value: usize| Mean::of(&all().map(|(r, w)| r.values()[value] * w).collect::<Vec<_>>());
     let of_events: Vec<f64> = all().filter(|(response, _)| response.is_event()).map(|(_, w)| *w).collect();

@@ -12,7 +12,7 @@
 //! independent samples of a plain campaign.
 
 use std::fs::{self, OpenOptions};
-use std::io::{BufReader, Seek as _, SeekFrom, Write as _};
+use std::io::{BufRead, BufReader, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::atomic::{WriteError, create_folder, is_temporary, write_file};
@@ -24,6 +24,7 @@ use super::files::{JOURNAL, MANIFEST, RESULT};
 use super::method::Method;
 use super::problem::{Point, Response};
 use crate::folder::FolderError;
+use crate::gate::Course;
 use crate::journal::{line, parse, read_line};
 use crate::lock::Lock;
 use crate::manifest::Manifest;
@@ -71,6 +72,9 @@ pub(super) struct RareRecord {
     pub(super) response: KeptResponse,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) failure: Option<SampleFailure>,
+    /// What the run shows of a scenario that states what must happen in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) course: Option<Course>,
 }
 
 /// Everything that determines the result.
@@ -109,6 +113,20 @@ impl RareManifest {
         compare("relative width", self.relative_width.to_string(), other.relative_width.to_string());
         if other.budget < self.budget {
             compare("budget", self.budget.to_string(), other.budget.to_string());
+        }
+        differences
+    }
+
+    /// Returns the manifest of the whole campaign. This one may describe a part of it.
+    pub(super) fn whole(&self) -> Self {
+        Self { campaign: self.campaign.whole(), ..self.clone() }
+    }
+
+    /// Returns one message for each difference from another manifest, also if its budget is larger.
+    pub(super) fn all_differences(&self, other: &Self) -> Vec<String> {
+        let mut differences = self.differences(other);
+        if other.budget > self.budget {
+            differences.push(format!("budget: {} there, {} here", self.budget, other.budget));
         }
         differences
     }
@@ -184,18 +202,19 @@ impl RareFolder {
         let mut options = OpenOptions::new();
         options.create(true).read(true).write(true).truncate(false);
         let file = input::open_in_folder(&path, &mut options).map_err(fail)?;
-        let (mut records, mut end, mut buffer): (Vec<KeptLine>, _, _) = (Vec::new(), 0, Vec::new());
-        let mut reader = BufReader::new(&file);
-        loop {
-            let read = read_line(&mut reader, &mut buffer).map_err(fail)?;
-            let Some(record) = Some(read).filter(|read| *read > 0).and_then(|_| parse(&buffer).ok()) else { break };
-            records.push(KeptLine { record, start: end });
-            end += read;
-        }
+        let (records, end) = kept_lines(&mut BufReader::new(&file)).map_err(fail)?;
         file.set_len(end).map_err(fail)?;
         let mut file = file;
         file.seek(SeekFrom::Start(end)).map_err(fail)?;
-        Ok(RareJournal { path, file, kept: records.into_iter(), line: 0, may_differ: self.has_grown })
+        Ok(RareJournal { path, file: Some(file), kept: records.into_iter(), line: 0, may_differ: self.has_grown })
+    }
+
+    /// Writes the whole journal.
+    ///
+    /// # Errors
+    /// [`WriteError`] if it cannot be written.
+    pub(super) fn write_journal(&self, records: &[RareRecord]) -> Result<(), WriteError> {
+        write_file(&self.path.join(JOURNAL), |out| records.iter().try_for_each(|record| out.write_all(&line(record)?)))
     }
 
     /// Writes the result.
@@ -212,6 +231,29 @@ impl RareFolder {
     }
 }
 
+/// Reads the intact lines of a journal. Returns their length, too (bytes).
+fn kept_lines(reader: &mut impl BufRead) -> std::io::Result<(Vec<KeptLine>, u64)> {
+    let (mut lines, mut end, mut buffer) = (Vec::new(), 0, Vec::new());
+    loop {
+        let read = read_line(reader, &mut buffer)?;
+        let Some(record) = Some(read).filter(|read| *read > 0).and_then(|_| parse(&buffer).ok()) else { break };
+        lines.push(KeptLine { record, start: end });
+        end += read;
+    }
+    Ok((lines, end))
+}
+
+/// Reads the intact lines of the journal in a folder.
+///
+/// # Errors
+/// [`FolderError::Read`] if it cannot be read.
+pub(super) fn read_records(folder: &Path) -> Result<Vec<RareRecord>, FolderError> {
+    let path = folder.join(JOURNAL);
+    let read = || kept_lines(&mut BufReader::new(input::open(&path)?));
+    let (lines, _) = read().map_err(|source| FolderError::Read { path: path.clone(), source })?;
+    Ok(lines.into_iter().map(|line| line.record).collect())
+}
+
 /// A line of the journal.
 #[derive(Debug)]
 struct KeptLine {
@@ -224,7 +266,8 @@ struct KeptLine {
 #[derive(Debug)]
 pub struct RareJournal {
     path: PathBuf,
-    file: fs::File,
+    /// The file to which lines are appended; `None` of a closed journal.
+    file: Option<fs::File>,
     kept: std::vec::IntoIter<KeptLine>,
     line: usize,
     /// Whether the journal may hold other points, because the budget has grown.
@@ -232,6 +275,23 @@ pub struct RareJournal {
 }
 
 impl RareJournal {
+    /// Returns a closed journal, which holds these lines and takes no others. `path` appears in
+    /// messages only.
+    pub(super) fn closed(path: &Path, records: Vec<RareRecord>) -> Self {
+        let kept: Vec<KeptLine> = records.into_iter().map(|record| KeptLine { record, start: 0 }).collect();
+        Self { path: path.to_owned(), file: None, kept: kept.into_iter(), line: 0, may_differ: false }
+    }
+
+    /// Returns true if the journal takes no further lines.
+    pub(super) const fn is_closed(&self) -> bool {
+        self.file.is_none()
+    }
+
+    /// Returns the next line, if one is left.
+    pub(super) fn rest(&self) -> Option<&RareRecord> {
+        self.kept.as_slice().first().map(|line| &line.record)
+    }
+
     /// Returns the next line, if there is one.
     ///
     /// # Errors
@@ -243,10 +303,10 @@ impl RareJournal {
         if is_same {
             return Ok(Some(record));
         }
-        if self.may_differ {
+        if let Some(file) = self.file.as_mut().filter(|_| self.may_differ) {
             // A search that the smaller budget has cut short goes on here.
             self.kept = Vec::new().into_iter();
-            let cut = self.file.set_len(start).and_then(|()| self.file.seek(SeekFrom::Start(start)));
+            let cut = file.set_len(start).and_then(|()| file.seek(SeekFrom::Start(start)));
             cut.map_err(|source| FolderError::from(WriteError::new(&self.path, source)))?;
             return Ok(None);
         }
@@ -261,8 +321,10 @@ impl RareJournal {
     pub(super) fn append(&mut self, record: &RareRecord) -> Result<(), WriteError> {
         let fail = |source| WriteError::new(&self.path, source);
         let line = line(record).map_err(fail)?;
-        self.file.write_all(&line).map_err(|source| WriteError::new(&self.path, source))?;
-        Ok(())
+        match self.file.as_mut() {
+            Some(file) => file.write_all(&line).map_err(fail),
+            None => Ok(()),
+        }
     }
 
     /// Synchronises the journal to the disk.
@@ -270,6 +332,6 @@ impl RareJournal {
     /// # Errors
     /// [`WriteError`] if the operating system reports a failure.
     pub fn sync(&self) -> Result<(), WriteError> {
-        self.file.sync_data().map_err(|source| WriteError::new(&self.path, source))
+        self.file.as_ref().map_or(Ok(()), fs::File::sync_data).map_err(|source| WriteError::new(&self.path, source))
     }
 }

@@ -61,6 +61,11 @@ impl Nearness {
         self.expression
     }
 
+    /// Returns which of [`Response::values`] is estimated: the event, or the difference of two.
+    pub const fn value(&self) -> usize {
+        if self.expression.second.is_some() { 2 } else { 0 }
+    }
+
     /// Returns the number that leads to the events, if one is named.
     pub const fn guide(&self) -> Option<Guide> {
         self.guide

@@ -9,10 +9,12 @@ use super::method::Method;
 use super::nearness::Nearness;
 use super::points::PointRunner;
 use super::problem::Seed;
+use super::relevance::Relevance;
 use super::report::RareReport;
 use super::runs::Runs;
 use super::search::search;
 use super::subset::subset;
+use crate::partition::Partition;
 use crate::runner::Work;
 use crate::stop::StopFlag;
 use crate::workers::Workers;
@@ -30,6 +32,9 @@ pub struct RarePlan {
     pub workers: Workers,
     /// The runner of the runs, if the threads of this process do not run them.
     pub remote: Option<Arc<dyn PointRunner>>,
+    /// The part of the last runs that are run; `None` for all of them. Only importance sampling has
+    /// parts.
+    pub part: Option<Partition>,
 }
 
 impl RarePlan {
@@ -37,7 +42,8 @@ impl RarePlan {
     /// `journal` are not run again. `on_run` is called after each run.
     ///
     /// # Errors
-    /// [`RareError`] if there is no result. The campaign can go on from its journal.
+    /// [`RareError`] if there is no result. The campaign can go on from its journal. A part ends with
+    /// [`RareError::PartEnds`].
     pub fn run(
         &self,
         (index, work): (usize, &Arc<Work>),
@@ -59,9 +65,11 @@ impl RarePlan {
             stop,
             journal,
             on_run,
+            part: self.part,
             done: 0,
             errors: 0,
             first_error: None,
+            relevance: Relevance::of(work),
             nearest: Vec::new(),
         };
         let mut report = match self.method {
@@ -80,6 +88,7 @@ impl RarePlan {
         }
         report.scenario.clone_from(&file.config().name);
         report.parameters = file.space().varying().map(|(name, _)| name.to_string()).collect();
+        report.not_judged = runs.relevance.not_judged();
         (report.errors, report.first_error, report.nearest) = (runs.errors, runs.first_error, runs.nearest);
         if report.errors > 0 {
             // A run that failed may have been an event.

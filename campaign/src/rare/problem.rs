@@ -89,6 +89,16 @@ pub trait Simulator {
     /// # Errors
     /// The reason for which no response comes back.
     fn run(&mut self, points: &[Point]) -> Result<Vec<Response>, Self::Error>;
+
+    /// Runs the last points, on which an estimate rests, and after which none follow. None of them
+    /// depends on the response of another one, so that a part of a campaign may run its share of
+    /// them, and end.
+    ///
+    /// # Errors
+    /// Works like [`Self::run`].
+    fn run_last(&mut self, points: &[Point]) -> Result<Vec<Response>, Self::Error> {
+        self.run(points)
+    }
 }
 
 /// The random numbers of a method.

@@ -87,6 +87,8 @@ pub struct RareReport {
     pub search: Option<SearchDetails>,
     /// The events nearest to the nominal case.
     pub nearest: Vec<Nearest>,
+    /// The reasons for which a low probability says nothing about the system under test.
+    pub not_judged: Vec<String>,
 }
 
 /// Details of a search for the first case.
@@ -165,6 +167,7 @@ impl RareReport {
             subset: None,
             search: None,
             nearest: Vec::new(),
+            not_judged: Vec::new(),
         }
     }
 
@@ -291,7 +294,7 @@ impl fmt::Display for RareReport {
                 self.errors, error.message
             )?;
         }
-        for warning in self.warnings() {
+        for warning in self.warnings().iter().chain(&self.not_judged) {
             writeln!(f, "  warning: {warning}")?;
         }
         Ok(())

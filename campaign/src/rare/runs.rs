@@ -8,8 +8,10 @@ use super::journal::{RareJournal, RareRecord};
 use super::nearness::Nearness;
 use super::points::{PointRunner, point_samples};
 use super::problem::{Point, Response, Simulator};
+use super::relevance::Relevance;
 use super::report::Nearest;
 use crate::campaign_error::CampaignError;
+use crate::partition::Partition;
 use crate::record::{Record, SampleFailure};
 use crate::runner::Work;
 use crate::stop::StopFlag;
@@ -28,11 +30,15 @@ pub(super) struct Runs<'a> {
     pub(super) journal: Option<&'a mut RareJournal>,
     /// Called after each run.
     pub(super) on_run: &'a mut dyn FnMut(),
+    /// The part of the last runs that are run; `None` for all of them.
+    pub(super) part: Option<Partition>,
     /// Number of runs so far.
     pub(super) done: u64,
     /// Runs that ended in an error, and the first error.
     pub(super) errors: u64,
     pub(super) first_error: Option<SampleFailure>,
+    /// What the runs show of the system under test.
+    pub(super) relevance: Relevance,
     /// The events that are nearest to the nominal case.
     pub(super) nearest: Vec<Nearest>,
 }
@@ -42,12 +48,14 @@ const SHOWN: usize = 3;
 
 impl Runs<'_> {
     /// Counts a run, whether it is new or read from the journal.
-    fn count(&mut self, point: &Point, response: &Response, failure: Option<&SampleFailure>) {
+    fn count(&mut self, point: &Point, record: &RareRecord) {
+        self.relevance.count(record.run, record.course);
         self.done += 1;
-        self.errors += u64::from(failure.is_some());
+        self.errors += u64::from(record.failure.is_some());
         if self.first_error.is_none() {
-            self.first_error = failure.cloned();
+            self.first_error.clone_from(&record.failure);
         }
+        let response = Response::from(record.response);
         if response.is_event() {
             let distance_sd = point.distance_sd();
             let rank = self.nearest.partition_point(|other| other.distance_sd <= distance_sd);
@@ -61,46 +69,51 @@ impl Runs<'_> {
         (self.on_run)();
     }
 
-    /// Returns the responses of the journal to the first of these points.
-    fn kept(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
+    /// Returns the responses of the journal to the first of these points, which have these numbers.
+    fn kept(&mut self, points: &[Point], numbers: &[u64]) -> Result<Vec<Response>, RareError> {
         let mut responses = Vec::new();
-        for point in points {
+        for (point, run) in points.iter().zip(numbers) {
             let scenario = &self.work.file.config().name;
             let record = match self.journal.as_mut() {
-                Some(journal) => journal.next(scenario, self.done, point)?,
+                Some(journal) => journal.next(scenario, *run, point)?,
                 None => None,
             };
-            let Some(RareRecord { response, failure, .. }) = record else { break };
-            let response = response.into();
-            self.count(point, &response, failure.as_ref());
-            responses.push(response);
+            let Some(record) = record else { break };
+            self.count(point, &record);
+            responses.push(record.response.into());
         }
         Ok(responses)
     }
 
-    fn push(&mut self, point: &Point, record: &Record) -> Result<Response, CampaignError> {
+    fn push(&mut self, run: u64, point: &Point, record: &Record) -> Result<Response, CampaignError> {
         let response = self.nearness.response(record);
-        let failure = record.arms.iter().find_map(|arm| arm.result.as_ref().err()).cloned();
+        let kept = RareRecord {
+            scenario: self.work.file.config().name.clone(),
+            run,
+            point: point.into(),
+            response: response.into(),
+            failure: record.arms.iter().find_map(|arm| arm.result.as_ref().err()).cloned(),
+            course: self.relevance.course(record),
+        };
         if let Some(journal) = self.journal.as_mut() {
-            let scenario = self.work.file.config().name.clone();
-            let (run, failure) = (self.done, failure.clone());
-            journal.append(&RareRecord { scenario, run, point: point.into(), response: response.into(), failure })?;
+            journal.append(&kept)?;
         }
-        self.count(point, &response, failure.as_ref());
+        self.count(point, &kept);
         Ok(response)
     }
-}
 
-impl Simulator for Runs<'_> {
-    type Error = RareError;
-
-    fn run(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
-        let mut responses = self.kept(points)?;
-        let new = &points[responses.len()..];
+    /// Returns the responses of points, which have these numbers.
+    fn respond(&mut self, points: &[Point], numbers: &[u64]) -> Result<Vec<Response>, RareError> {
+        let mut responses = self.kept(points, numbers)?;
+        let (new, of_new) = (&points[responses.len()..], &numbers[responses.len()..]);
+        let is_closed = self.journal.as_ref().is_some_and(|journal| journal.is_closed());
+        if let Some(run) = of_new.first().filter(|_| is_closed) {
+            return Err(RareError::MissingRun { scenario: self.work.file.config().name.clone(), run: *run });
+        }
         let (index, work, workers, remote, stop) = (self.index, self.work, self.workers, self.remote, self.stop);
         let mut number = 0;
         let mut on_finished = |finished: Finished| {
-            responses.push(self.push(&new[number], &finished.record)?);
+            responses.push(self.push(of_new[number], &new[number], &finished.record)?);
             number += 1;
             Ok::<_, CampaignError>(ControlFlow::Continue(()))
         };
@@ -112,5 +125,29 @@ impl Simulator for Runs<'_> {
             }
         }
         if responses.len() < points.len() { Err(RareError::Stopped) } else { Ok(responses) }
+    }
+}
+
+impl Simulator for Runs<'_> {
+    type Error = RareError;
+
+    fn run(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
+        self.relevance.begin(points.len() as u64);
+        let numbers: Vec<u64> = (self.done..).take(points.len()).collect();
+        self.respond(points, &numbers)
+    }
+
+    /// A part runs those whose number belongs to it. All runs before are the same in every part, so
+    /// that the number of a run is the same, too.
+    fn run_last(&mut self, points: &[Point]) -> Result<Vec<Response>, RareError> {
+        let Some(part) = self.part else { return self.run(points) };
+        self.relevance.begin(points.len() as u64);
+        let of_part = points.iter().cloned().zip(self.done..).filter(|(_, run)| part.contains(*run));
+        let (points, numbers): (Vec<Point>, Vec<u64>) = of_part.unzip();
+        self.respond(&points, &numbers)?;
+        if let Some(journal) = &self.journal {
+            journal.sync()?;
+        }
+        Err(RareError::PartEnds { runs: self.done })
     }
 }

@@ -29,7 +29,7 @@ pub fn boundary(boundary: &Boundary) -> Value {
 }
 
 fn surface(surveyed: &Surveyed) -> Value {
-    let Surveyed { slices, area, check, doubts, .. } = surveyed;
+    let Surveyed { slices, area, check, noise_sd, doubts, .. } = surveyed;
     json!({
         "doubts": doubts.iter().map(Doubt::to_string).collect::<Vec<_>>(),
         "area": { "passes": area.passes, "fails": area.fails, "undecided": area.undecided },
@@ -42,6 +42,7 @@ fn surface(surveyed: &Surveyed) -> Value {
             "start_signs": check.start_signs,
             "inside_95": check.inside_95,
         },
+        "noise_sd": noise_sd,
         "slices": slices.iter().map(slice).collect::<Vec<_>>(),
     })
 }

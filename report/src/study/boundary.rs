@@ -11,6 +11,9 @@ use super::aligned::{error_lines, write_rows};
 use super::frontier::short;
 use crate::charts::{BoundaryMap, BoundaryPoint, boundary_map};
 
+/// The standard normal quantile of 97.5 %.
+const Z_95: f64 = 1.96;
+
 /// A boundary as text.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoundaryText<'a>(pub(super) &'a Boundary);
@@ -71,15 +74,19 @@ pub(super) fn ranges(boundary: &Boundary) -> String {
     format!("{}, {}", range(0), range(1))
 }
 
-/// Returns the shares of the area, and how well the runs are predicted.
-pub(super) fn statements(surveyed: &Surveyed) -> [String; 2] {
+/// Returns the shares of the area, how well the runs are predicted, and what the intervals leave out.
+pub(super) fn statements(surveyed: &Surveyed) -> [String; 3] {
     let (area, check) = (surveyed.area, surveyed.check);
+    let scatter = significant(Z_95 * surveyed.noise_sd, DIGITS);
     let [passes, fails, undecided] = [area.passes, area.fails, area.undecided].map(percent);
     [
         format!("area: the event happens in {fails}, does not happen in {passes}, and {undecided} is undecided"),
         format!(
             "each run predicted from the others: {} of {} have the predicted sign ({:.1} expected), {} of the {} first ones; {} are in their 95 % interval",
             check.signs, check.runs, check.signs_expected, check.start_signs, check.start_runs, check.inside_95
+        ),
+        format!(
+            "intervals and shares are of the surface; they leave out the scatter of single runs about it, ±{scatter} in the unit of the number (95 %)"
         ),
     ]
 }

@@ -5,7 +5,7 @@ use closecall_traffic::statistics::normal::TruncatedStandardNormal;
 use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{ParameterName, Value};
 
-use super::{ParameterSpace, ParametersConfig, SpaceEntry};
+use super::{NormalPoint, ParameterSpace, ParametersConfig, SpaceEntry};
 use crate::sampling::{Design, unit_point};
 use closecall_recorded::criticality::spearman;
 
@@ -129,6 +129,34 @@ fn the_distance_to_the_nominal_values_is_the_length_of_the_point_in_normal_space
             let (ours, expected) = (space.distance_sd(&values).unwrap(), normals.iter().map(|z| z * z).sum::<f64>());
             assert!((ours - expected.sqrt()).abs() < 1e-4, "{ours} instead of {}", expected.sqrt());
         }
+    }
+}
+
+#[test]
+fn a_sample_has_a_point_in_normal_space_that_gives_it_back() {
+    let label = ParameterName::new("d").unwrap();
+    for space in [coupled("a = 0.6, c = -0.4").unwrap(), parsed(INDEPENDENT).unwrap()] {
+        let origin = space.normal_point(&space.nominal()).unwrap();
+        assert!(space.length_sd(&origin) < 1e-9 && origin.normals.len() == 3 && origin.labels.len() == 1);
+        let zero = NormalPoint { normals: vec![0.0; 3], ..NormalPoint::default() };
+        // To the bit: a parameter that is not moved is not listed as moved.
+        assert_eq!(space.at_normal_point(&zero), space.nominal());
+        for index in 0..50 {
+            let sample = space.sample(Design::Random, 7, index, 50);
+            let point = space.normal_point(&sample).unwrap();
+            assert!((space.length_sd(&point) - space.distance_sd(&sample).unwrap()).abs() < 1e-9);
+            let again = space.at_normal_point(&point);
+            assert_eq!(again.get(&label), sample.get(&label));
+            for (name, value) in sample.iter() {
+                if let (Value::Number(value), Some(Value::Number(again))) = (value, again.get(name)) {
+                    assert!((value - again).abs() < 1e-6, "{name}: {again} instead of {value}");
+                }
+            }
+        }
+        // A label that is as probable as the nominal one is no further away.
+        let mut other = origin.clone();
+        other.labels.insert(label.clone(), "y".to_owned());
+        assert!(space.at_normal_point(&other) != space.nominal() && space.length_sd(&other) < 1e-9);
     }
 }
 

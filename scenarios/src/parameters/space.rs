@@ -6,6 +6,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use closecall_traffic::{ParameterName, Parameters, Value, maths};
 
 use super::copula::Copula;
+use super::normal_point::NormalPoint;
 use super::strata::Strata;
 use super::{Distribution, FittedConfig, ObservedConfig};
 
@@ -69,6 +70,10 @@ pub enum Variation {
 
 /// Probability of the median.
 const HALF: f64 = 0.5;
+
+/// Largest distance of a coupled number u from [`HALF`] that is taken for a rounding error (-): more
+/// than a thousand spacings of such numbers, and no sampled number is so near.
+const ROUNDING: f64 = 1e-12;
 
 /// Returns the standard normal probability below `z`, within the domain of a quantile function:
 /// above 0 and below 1.
@@ -167,6 +172,51 @@ impl ParameterSpace {
         let mut normals = self.entries.iter().map(number).collect::<Option<Vec<f64>>>()?;
         self.copula.uncouple(&mut normals);
         Some(normals.iter().map(|z| z * z).sum::<f64>().sqrt())
+    }
+
+    /// Returns the point of standard normal space that has these values, with the labels beside it.
+    /// Works like [`Self::distance_sd`] where there is none.
+    pub fn normal_point(&self, values: &Parameters) -> Option<NormalPoint> {
+        let number = |(name, entry): (&ParameterName, &SpaceEntry)| entry.distribution.distance_sd(values.get(name)?);
+        let mut normals = self.entries.iter().map(number).collect::<Option<Vec<f64>>>()?;
+        self.copula.uncouple(&mut normals);
+        let of_numbers = self.entries.values().zip(normals);
+        let of_numbers = of_numbers.filter(|(entry, _)| entry.distribution.variation() == Variation::Continuous);
+        let labels = self.varying().filter_map(|(name, _)| match values.get(name)? {
+            Value::Label(label) => Some((name.clone(), label.clone())),
+            Value::Number(_) => None,
+        });
+        Some(NormalPoint { normals: of_numbers.map(|(_, z)| z).collect(), labels: labels.collect() })
+    }
+
+    /// Returns the values at a point of standard normal space: what [`Self::normal_point`] does,
+    /// backwards. A number or a label that the point lacks is nominal.
+    pub fn at_normal_point(&self, point: &NormalPoint) -> Parameters {
+        let mut coordinates = point.normals.iter();
+        let number = |entry: &SpaceEntry| match entry.distribution.variation() {
+            Variation::Continuous => coordinates.next().map_or(HALF, |z| probability_below(*z)),
+            Variation::None | Variation::Discrete => HALF,
+        };
+        let mut numbers: Vec<f64> = self.entries.values().map(number).collect();
+        self.copula.couple(&mut numbers);
+        self.map(|name, index, distribution| match distribution.variation() {
+            Variation::Continuous if (numbers[index] - HALF).abs() > ROUNDING => distribution.quantile(numbers[index]),
+            Variation::Discrete => {
+                let label = point.labels.get(name).cloned();
+                label.map_or_else(|| distribution.nominal(), Value::Label)
+            }
+            Variation::None | Variation::Continuous => distribution.nominal(),
+        })
+    }
+
+    /// Returns the distance of a point to the nominal values (standard deviations): its length, with
+    /// the distances of its labels.
+    pub fn length_sd(&self, point: &NormalPoint) -> f64 {
+        let of_label = |(name, label): (&ParameterName, &String)| {
+            self.get(name)?.distribution.distance_sd(&Value::Label(label.clone()))
+        };
+        let of_labels = point.labels.iter().filter_map(of_label);
+        point.normals.iter().copied().chain(of_labels).map(|z| z * z).sum::<f64>().sqrt()
     }
 
     /// Returns the nominal values, then variations of them with one parameter at one of its bounds

@@ -11,8 +11,14 @@
 //! parameters from the sample until no single one can be removed. Then each remaining number moves
 //! towards its nominal value by bisection, on a grid of readable values. The random numbers of the
 //! sample stay: the files name them, and a plain `closecall run FILE` repeats the case.
+//!
+//! The smallest case has the fewest parameters off nominal. The failing case *nearest* to the nominal
+//! one ([`NearestSearch`]) has the smallest distance in standard normal space, with as many
+//! parameters off nominal as that takes.
 
+mod design_point;
 mod grid;
+mod nearest;
 mod run;
 mod subset;
 mod text;
@@ -21,6 +27,7 @@ mod twin;
 mod words;
 mod write;
 
+pub use nearest::{NearestFailure, NearestSearch};
 pub use run::{Minimized, Offset, minimize, minimize_sample};
 pub use text::MinimizedText;
 pub use twin::Twin;

@@ -6,6 +6,7 @@ use closecall_simulation::controller::ControllerChoice;
 use closecall_traffic::{ParameterName, Parameters, Value};
 use serde::Serialize;
 
+use super::nearest::NearestFailure;
 use super::subset::fewest;
 use super::trial::Trial;
 use super::twin::{Candidate, Twin, twin};
@@ -33,9 +34,15 @@ pub struct Offset {
     /// How far the value is from the nominal one, with sign (standard deviations); `None` of a value
     /// that the distribution never takes.
     pub distance_sd: Option<f64>,
+    /// How far the value is from the nominal one, with sign, in the parameter's unit; `None` of a
+    /// label.
+    pub difference: Option<f64>,
+    /// The difference in words, in the units of a reader.
+    #[serde(skip)]
+    pub difference_words: Option<String>,
 }
 
-/// The smallest failing case near a sample.
+/// The smallest failing case near a sample, or the failing case nearest to the nominal one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Minimized {
     /// The scenario's name.
@@ -70,6 +77,9 @@ pub struct Minimized {
     pub sentence: String,
     /// The nearest case that passes; `None` if none was found.
     pub twin: Option<Twin>,
+    /// The search for the case, if it is the one nearest to the nominal case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest: Option<NearestFailure>,
 }
 
 impl Minimized {
@@ -96,18 +106,30 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
     let trial = Trial::new(case);
     let subset = fewest(&trial);
     let (values, candidates) = shrunk(&trial, &subset.names);
-    let settings = Trial::settings(&values)?;
+    let minimized = described(&trial, &values, &subset.names, &candidates)?;
+    let why_more_than_three = (minimized.off_nominal.len() > 3).then(|| {
+        let more = if subset.is_smallest { "four are needed" } else { "of these, none can be left out" };
+        format!("no set of three parameters fails with the others at their nominal values, and {more}")
+    });
+    Ok(Some(Minimized { why_more_than_three, ..minimized }))
+}
+
+/// Describes a case that fails with these values, of which the named ones are off nominal.
+pub(super) fn described(
+    trial: &Trial<'_>,
+    values: &Parameters,
+    names: &[ParameterName],
+    candidates: &[Candidate],
+) -> Result<Minimized, CausesError> {
+    let case = trial.case;
+    let settings = Trial::settings(values)?;
     let (_, collision) = attribute(case, &settings)?;
     let controller = case.arm.controller.name();
     let not_reduced = || CausesError::NotReduced { sample: case.sample, controller: controller.to_owned() };
     let collision = collision.ok_or_else(not_reduced)?;
-    let off_nominal: Vec<Offset> = subset.names.iter().filter_map(|name| offset(&trial, &values, name)).collect();
-    let why_more_than_three = (off_nominal.len() > 3).then(|| {
-        let more = if subset.is_smallest { "four are needed" } else { "of these, none can be left out" };
-        format!("no set of three parameters fails with the others at their nominal values, and {more}")
-    });
+    let off_nominal: Vec<Offset> = names.iter().filter_map(|name| offset(trial, values, name)).collect();
     let sentence = words::sentence(&collision, &off_nominal);
-    Ok(Some(Minimized {
+    Ok(Minimized {
         scenario: case.file.config().name.clone(),
         seed: case.sampling.seed,
         sample: case.sample,
@@ -116,14 +138,15 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
         reference: case.reference.as_ref().map(|arm| arm.controller.name().to_owned()),
         sensors: case.sensors().name().to_owned(),
         off_nominal,
-        distance_sd: case.file.space().distance_sd(&values),
+        distance_sd: case.file.space().distance_sd(values),
         sampled_off_nominal: trial.differing.len(),
-        why_more_than_three,
+        why_more_than_three: None,
         settings: settings.iter().map(ToString::to_string).collect(),
-        twin: twin(&trial, &values, &candidates)?,
+        twin: twin(trial, values, candidates)?,
         collision,
         sentence,
-    }))
+        nearest: None,
+    })
 }
 
 /// Minimizes a failing sample of a campaign.
@@ -131,12 +154,16 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
 /// # Errors
 /// [`CausesError`] if the sample does not fail, or has no outcome.
 pub fn minimize_sample(saved: &SavedCampaign, case: &Case) -> Result<Minimized, CausesError> {
-    let minimized = minimize(case)?.ok_or_else(|| passes(saved, case))?;
+    Ok(with_choice(saved, minimize(case)?.ok_or_else(|| passes(saved, case))?))
+}
+
+/// Names the controller of a case as the option `--controller` takes it.
+pub(super) fn with_choice(saved: &SavedCampaign, minimized: Minimized) -> Minimized {
     // A process has a name in reports, and a command on the command line.
     let manifest = saved.manifest();
     let mut arms = manifest.arms.iter().zip(manifest.arm_names());
     let choice = arms.find(|(_, name)| *name == minimized.controller).map(|(arm, _)| arm.to_string());
-    Ok(Minimized { choice: choice.unwrap_or_else(|| minimized.controller.clone()), ..minimized })
+    Minimized { choice: choice.unwrap_or_else(|| minimized.controller.clone()), ..minimized }
 }
 
 fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Option<Offset> {
@@ -148,6 +175,11 @@ fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Optio
         nominal: nominal.to_string(),
         words: words::value(name.as_str(), value, nominal, trial.step(name)),
         distance_sd: trial.case.file.space().get(name)?.distribution.distance_sd(value),
+        difference: match (value, nominal) {
+            (Value::Number(value), Value::Number(nominal)) => Some(value - nominal),
+            _ => None,
+        },
+        difference_words: words::difference(name.as_str(), value, nominal, trial.step(name)),
     })
 }
 

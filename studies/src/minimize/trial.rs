@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use closecall_campaign::runner::run_guarded;
 use closecall_scenarios::outcome::Outcome;
@@ -26,6 +27,8 @@ pub(super) struct Trial<'a> {
     is_robust: bool,
     /// Results so far, by the values of the parameters.
     results: Mutex<BTreeMap<String, bool>>,
+    /// Number of runs so far.
+    runs: AtomicU64,
 }
 
 impl<'a> Trial<'a> {
@@ -34,9 +37,15 @@ impl<'a> Trial<'a> {
         let (sampled, nominal) = (case.sampled(), case.file.space().nominal());
         let differing = sampled.iter().filter(|(name, value)| nominal.get(name) != Some(value));
         let differing = differing.map(|(name, _)| name.clone()).collect();
-        let trial = Self { case, sampled, nominal, differing, is_robust: true, results: Mutex::default() };
+        let (results, runs) = (Mutex::default(), AtomicU64::default());
+        let trial = Self { case, sampled, nominal, differing, is_robust: true, results, runs };
         let is_robust = trial.fails(&trial.sampled);
         Self { is_robust, results: Mutex::default(), ..trial }
+    }
+
+    /// Returns the number of runs so far, the runs at half the time step among them.
+    pub(super) fn runs(&self) -> u64 {
+        self.runs.load(Ordering::Relaxed)
     }
 
     /// Returns the nominal values with the named parameters at the values of the sample.
@@ -82,7 +91,10 @@ impl<'a> Trial<'a> {
     /// Returns whether a condition holds for the outcome of a scenario in an arm, at the time step
     /// and at half of it.
     fn holds_in(&self, scenario: &Scenario, arm: &Arm, holds: impl Fn(&Outcome) -> bool) -> bool {
-        let run = |scenario: &Scenario| run_guarded(scenario, self.case.key(), arm, &mut NoObserver);
+        let run = |scenario: &Scenario| {
+            self.runs.fetch_add(1, Ordering::Relaxed);
+            run_guarded(scenario, self.case.key(), arm, &mut NoObserver)
+        };
         let has = |scenario: &Scenario| run(scenario).is_ok_and(|outcome| holds(&outcome));
         has(scenario) && (!self.is_robust || has(&scenario.at_half_step()))
     }

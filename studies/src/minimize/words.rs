@@ -71,6 +71,15 @@ pub(super) fn value(name: &str, value: &Value, nominal: &Value, step: Option<f64
     }
 }
 
+/// Returns how far a number is from the nominal one in words, such as `9.1 km/h more`; `None` of a
+/// label. `step` is the step of the parameter's grid.
+pub(super) fn difference(name: &str, value: &Value, nominal: &Value, step: Option<f64>) -> Option<String> {
+    let (Value::Number(value), Value::Number(nominal)) = (value, nominal) else { return None };
+    let how = if value > nominal { "more" } else { "less" };
+    let [_, _, by] = Named::of(name).numbers([*value, *nominal], step);
+    Some(format!("{by} {how}"))
+}
+
 /// Returns a change in words, after "passes when". `step` is the step of the parameter's grid.
 pub(super) fn change(name: &str, failing: &Value, passing: &Value, step: Option<f64>) -> String {
     let named = Named::of(name);
@@ -132,6 +141,10 @@ mod tests {
             "brake is 0.05 m/s² less (5.95 m/s² instead of 6.00 m/s²)"
         );
         let label = |text: &str| Value::Label(text.to_owned());
+        let to_nominal = |from: f64, to: f64| difference("closing-mps", &number(from), &number(to), None);
+        assert_eq!(to_nominal(10.0, 8.35).as_deref(), Some("5.9 km/h more"));
+        assert_eq!(to_nominal(8.35, 10.0).as_deref(), Some("5.9 km/h less"));
+        assert_eq!(difference("rear-class", &label("truck"), &label("car"), None), None);
         assert_eq!(
             change("rear-class", &label("motorcycle"), &label("car"), None),
             "rear class is car instead of motorcycle"

@@ -150,6 +150,14 @@ fn number(value: u64) -> Value {
 fn sentence(text: &Text<'_>) -> String {
     let twin = text.minimized.twin.as_ref();
     match (text.is_twin, twin) {
+        (false, _) if text.minimized.nearest.is_some() => {
+            let distance_sd = text.minimized.distance_sd.unwrap_or_default();
+            let nearest = "The nearest failure that a search has found";
+            format!(
+                "{} {nearest}: {distance_sd:.2} standard deviations from the nominal case.",
+                text.minimized.sentence
+            )
+        }
         (true, Some(twin)) => format!("Passes when {}. Otherwise: {}", twin.words, text.minimized.sentence),
         _ => match &text.minimized.reference {
             Some(reference) => format!("{} No vehicle collides with {reference}.", text.minimized.sentence),

@@ -182,7 +182,8 @@ fn an_answer_that_is_not_that_of_the_block_is_an_error() {
 fn rare(remote: Option<Arc<dyn PointRunner>>) -> Result<RareReport, RareError> {
     let nearness = Nearness::new("collision".parse().unwrap(), None).unwrap();
     let goal = Goal { relative_width: 0.5, budget: 600, value: 0 };
-    let sampled = RarePlan { method: Method::Importance, nearness, goal, workers: Workers::default(), remote };
+    let workers = Workers::default();
+    let sampled = RarePlan { method: Method::Importance, nearness, goal, workers, remote, part: None };
     let work = plan(3).campaign().works[0].clone();
     sampled.run((0, &work), None, &StopFlag::default(), &mut || {})
 }

@@ -1,0 +1,146 @@
+//! Whether the runs of a rare event say anything about the system under test.
+//!
+//! A scenario states what must happen in a run for it to count (`expects`), and an event that cannot
+//! happen is rare. So a probability that is low enough is no pass if what the scenario is about did
+//! not happen, or if the system under test never acted.
+//!
+//! Later runs are moved towards the event. The first runs of every method are independent samples of
+//! the scenario: only they count for the share in which something happens.
+
+use closecall_scenarios::Function;
+use closecall_scenarios::criteria::FlagName;
+use closecall_traffic::words::counted;
+
+use crate::gate::{Course, ExpectationResult, asks_for_action, missing_action};
+use crate::record::Record;
+use crate::runner::Work;
+
+/// What the runs of a scenario are to show, and what they have shown.
+#[derive(Clone, Debug)]
+pub(super) struct Relevance {
+    scenario: String,
+    expects: Vec<FlagName>,
+    least_share: f64,
+    function: Function,
+    /// Whether a system that never acts was not tested.
+    needs_action: bool,
+    /// Number of the first runs; `None` before them.
+    first: Option<u64>,
+    /// First runs with an outcome, and those in which everything happened.
+    samples: u64,
+    happened: u64,
+    /// All runs with an outcome, and those in which the system acted.
+    runs: u64,
+    acted: u64,
+}
+
+impl Relevance {
+    pub(super) fn of(work: &Work) -> Self {
+        let config = work.file.config();
+        let is_told = work.arms.len() > 1 || config.function == Function::Mis;
+        Self {
+            scenario: config.name.clone(),
+            expects: config.expects.clone(),
+            least_share: config.expects_share,
+            function: config.function,
+            needs_action: asks_for_action(config) && is_told,
+            first: None,
+            samples: 0,
+            happened: 0,
+            runs: 0,
+            acted: 0,
+        }
+    }
+
+    /// Returns what a run shows; `None` if it has no outcome, or the scenario asks for nothing.
+    pub(super) fn course(&self, record: &Record) -> Option<Course> {
+        let asks = !self.expects.is_empty() || self.needs_action;
+        asks.then(|| Course::of(record, &self.expects, self.function)).flatten()
+    }
+
+    /// Says that so many runs follow. The first ones are samples of the scenario.
+    pub(super) fn begin(&mut self, runs: u64) {
+        self.first.get_or_insert(runs);
+    }
+
+    /// Counts a run by its number.
+    pub(super) fn count(&mut self, run: u64, course: Option<Course>) {
+        let Some(Course { happened, acted }) = course else { return };
+        self.runs += 1;
+        self.acted += u64::from(acted);
+        if self.first.is_some_and(|first| run < first) {
+            self.samples += 1;
+            self.happened += u64::from(happened);
+        }
+    }
+
+    /// Returns the reasons for which a low probability says nothing.
+    pub(super) fn not_judged(&self) -> Vec<String> {
+        let expectation = ExpectationResult {
+            scenario: self.scenario.clone(),
+            expects: self.expects.clone(),
+            happened: self.happened,
+            samples: self.samples,
+            least_share: self.least_share,
+        };
+        let is_missed = !self.expects.is_empty() && self.samples > 0 && !expectation.is_met();
+        let missed = is_missed.then(|| format!("what the scenario is about did not happen: {expectation}"));
+        let is_idle = self.needs_action && self.runs > 0 && self.acted == 0;
+        let idle = is_idle.then(|| {
+            let (missing, runs) = (missing_action(self.function), counted(self.runs, "run"));
+            format!("the system under test never {missing} in {runs}, and they do not decide what it does")
+        });
+        missed.into_iter().chain(idle).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_scenarios::criteria::EGO_COLLIDED;
+
+    use super::*;
+
+    fn relevance() -> Relevance {
+        Relevance {
+            scenario: "one".to_owned(),
+            expects: vec![EGO_COLLIDED.parse().unwrap()],
+            least_share: 0.5,
+            function: Function::Mis,
+            needs_action: true,
+            first: None,
+            samples: 0,
+            happened: 0,
+            runs: 0,
+            acted: 0,
+        }
+    }
+
+    #[test]
+    fn only_the_first_runs_show_how_often_something_happens() {
+        let mut relevance = relevance();
+        relevance.begin(4);
+        relevance.begin(100);
+        for run in 0..50 {
+            // Everything happens in the runs that were moved towards the event.
+            relevance.count(run, Some(Course { happened: run >= 3, acted: true }));
+        }
+        let reasons = relevance.not_judged();
+        assert!(reasons.len() == 1 && reasons[0].contains("1 of 4 (25.0 %, at least 50.0 % expected)"), "{reasons:?}");
+    }
+
+    #[test]
+    fn a_system_that_acts_in_any_run_was_there_to_be_tested() {
+        let mut relevance = relevance();
+        relevance.begin(2);
+        relevance.count(0, Some(Course { happened: true, acted: false }));
+        relevance.count(1, None);
+        assert!(relevance.not_judged()[0].starts_with("the system under test never slowed the ego"));
+        relevance.count(2, Some(Course { happened: true, acted: true }));
+        assert_eq!(relevance.not_judged(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn without_runs_nothing_is_said() {
+        assert_eq!(relevance().not_judged(), Vec::<String>::new());
+    }
+}
