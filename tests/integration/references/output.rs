@@ -260,8 +260,10 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     stdout(&closecall(record), 0);
     let alone = at("alone.csv");
     alone_in(&few, first["track_id"].as_u64().unwrap(), &alone);
-    let (many, single) =
-        (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
+    let (many, single) = (
+        program(&["traffic", "criticality", &csv, "--curvilinear"], 0),
+        program(&["traffic", "criticality", &alone, "--curvilinear"], 0),
+    );
     hold("criticality", each(&many).into_iter().chain(each(&single)));
     hold("reenact", [&program(&["traffic", "reenact", &csv], 0)]);
     let sampled =
