@@ -265,6 +265,7 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
         program(&["traffic", "criticality", &alone, "--curvilinear"], 0),
     );
     hold("criticality", each(&many).into_iter().chain(each(&single)));
+    hold("aerial", [&program(&["traffic", "aerial", &few, "--around-s", "2", "-o", &at("flown")], 0)]);
     hold("reenact", [&program(&["traffic", "reenact", &csv], 0)]);
     let sampled =
         program(&["traffic", "sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
