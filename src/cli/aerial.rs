@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_recorded::aerial::dataset::write_png;
-use closecall_recorded::aerial::{Flight, FlightOptions, Footage, fly_watched, losses};
+use closecall_recorded::aerial::{Boxes, Correction, Flight, FlightOptions, Footage, fly_watched, losses};
 use closecall_recorded::trajectory_data::write_trajectories;
 use closecall_report::json::stamped;
 use closecall_sensors::inference_backend;
@@ -38,11 +38,32 @@ enum Pictures {
     Published,
 }
 
+/// The boxes from which tracks are derived.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum BoxesChoice {
+    /// Those that the detector finds in the pictures
+    #[default]
+    Detected,
+    /// The exact boxes around all vehicles, as a perfect detector would find them; no picture is
+    /// searched
+    Exact,
+}
+
+/// How the perspective bias is corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum CorrectionChoice {
+    /// By the typical height of the class: 1.5 m for cars, 4.0 m for trucks
+    #[default]
+    ClassHeight,
+    /// By a height that is estimated for each vehicle from the width of its box
+    Silhouette,
+}
+
 /// Arguments of `closecall traffic aerial`.
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall traffic aerial traffic.csv -o flown",
-    "closecall traffic aerial trucks.csv -o flown --off-nadir-deg 10 --georeferencing-m 0",
+    "closecall traffic aerial trucks.csv -o flown --georeferencing-m 0 --correction silhouette",
     "closecall traffic aerial traffic.csv -o flown --pictures published --around-s 4",
 ]))]
 pub(super) struct AerialArgs {
@@ -58,6 +79,12 @@ pub(super) struct AerialArgs {
     /// Rate and size of the pictures
     #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
     pictures: Pictures,
+    /// Boxes from which the tracks are derived
+    #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
+    boxes: BoxesChoice,
+    /// How the perspective bias of the vehicles' heights is corrected
+    #[arg(long, value_enum, default_value_t, help_heading = heading::METHOD)]
+    correction: CorrectionChoice,
     /// Time before and after each lane change that is watched, in s, 2 to 1000
     #[arg(long, value_name = "S", default_value_t = FlightOptions::default().reach_s, help_heading = heading::METHOD)]
     around_s: f64,
@@ -85,6 +112,14 @@ impl AerialArgs {
             footage: match self.pictures {
                 Pictures::Strip => Footage::Strip,
                 Pictures::Published => Footage::Published,
+            },
+            boxes: match self.boxes {
+                BoxesChoice::Detected => Boxes::Detected,
+                BoxesChoice::Exact => Boxes::Exact,
+            },
+            correction: match self.correction {
+                CorrectionChoice::ClassHeight => Correction::ClassHeight,
+                CorrectionChoice::Silhouette => Correction::Silhouette,
             },
             offset_sigma_m: self.georeferencing_m,
             reach_s: self.around_s,

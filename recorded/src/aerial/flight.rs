@@ -6,6 +6,7 @@ use crate::filters::{PERIOD, smooth};
 use crate::lane_change::detect;
 use crate::trajectory_data::TrajectoryData;
 use closecall_sensors::camera::Backend;
+use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{
     ActorId, BodyShape, Dimensions, Lane, Stream, Time, Trajectory, TrajectoryPoint, Vehicle, VehicleClass, stream,
 };
@@ -15,12 +16,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::aerial::camera::{ALTITUDE_M, AerialCamera, OFF_NADIR_RAD, View};
-use crate::aerial::detector::{DETECTED_FROM, Detector};
+use crate::aerial::detector::{DETECTED_FROM, Detector, ImageDetection};
 use crate::aerial::error::AerialError;
 use crate::aerial::footage::Footage;
-use crate::aerial::footprint::{corrected, raw};
+use crate::aerial::footprint::{ExpectedSize, corrected, raw, silhouette};
 use crate::aerial::ground::Ground;
-use crate::aerial::picture::{AerialPicture, AerialScene, GroundVehicle, Light};
+use crate::aerial::picture::{AerialPicture, AerialScene, GroundVehicle, Light, exact_boxes};
 use crate::aerial::tracker::{AerialTrack, GroundDetection, track};
 
 /// Time between two pictures of [`Footage::Strip`]: every second one of a video of 25 Hz, as highD
@@ -38,6 +39,35 @@ const MOST_LANES: u8 = 8;
 /// Margin by which a vehicle has to be within the picture, so that it counts as watched (px).
 const MARGIN_PX: f64 = 40.0;
 
+/// Standard deviations of the width of a detected box on the ground (m), of cars and of trucks. They
+/// are measured on 160 pictures of the training set at 11 to 34° from the nadir, against the exact
+/// boxes (1.48 median absolute deviations of 426 cars and 241 trucks: 0.14 to 0.19 m and 0.28 to
+/// 0.32 m).
+const DETECTED_WIDTH_SIGMA_M: [f64; 2] = [0.17, 0.30];
+
+/// The boxes from which tracks are derived.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Boxes {
+    /// Those that the detector finds in the pictures.
+    #[default]
+    Detected,
+    /// The exact boxes around all vehicles in the picture, also around hidden ones: what a perfect
+    /// detector would find. Errors that remain are those of the geometry.
+    Exact,
+}
+
+/// How the perspective bias is corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Correction {
+    /// By the typical height of the class ([`corrected`]).
+    #[default]
+    ClassHeight,
+    /// By a height that is estimated for each vehicle from its silhouette ([`silhouette`]).
+    Silhouette,
+}
+
 /// The options of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FlightOptions {
@@ -47,6 +77,10 @@ pub struct FlightOptions {
     pub off_nadir_rad: f64,
     /// Rate and size of the pictures.
     pub footage: Footage,
+    /// The boxes from which tracks are derived.
+    pub boxes: Boxes,
+    /// How the perspective bias is corrected.
+    pub correction: Correction,
     /// Standard deviation, along each axis, of the constant error of georeferencing (m).
     pub offset_sigma_m: f64,
     /// Standard deviation, along each axis, of its error from picture to picture (m).
@@ -63,6 +97,8 @@ impl Default for FlightOptions {
             altitude_m: ALTITUDE_M,
             off_nadir_rad: OFF_NADIR_RAD,
             footage: Footage::default(),
+            boxes: Boxes::default(),
+            correction: Correction::default(),
             offset_sigma_m: OFFSET_SIGMA_M,
             jitter_sigma_m: JITTER_SIGMA_M,
             reach_s: 7.0,
@@ -137,7 +173,7 @@ pub fn fly_watched(
     for times in &spans {
         let scenes: Vec<AerialScene> = times.iter().map(|time| scene_at(data, &edges_m, *time, options)).collect();
         let cameras: Vec<AerialCamera> = scenes.iter().map(|scene| camera_above(scene, &edges_m, options)).collect();
-        let [raw, corrected] = detections((&scenes, &cameras), options.footage, backend, &on_picture)?;
+        let [raw, corrected] = detections((&scenes, &cameras), options, backend, &on_picture)?;
         let (span_errors, rest) = errors.split_at(times.len());
         errors = rest;
         for (frames, all) in [(raw, &mut seen), (corrected, &mut flat)] {
@@ -165,24 +201,29 @@ pub fn fly_watched(
 /// corrected.
 fn detections(
     (scenes, cameras): (&[AerialScene], &[AerialCamera]),
-    footage: Footage,
+    options: &FlightOptions,
     backend: &Backend,
     on_picture: &(dyn Fn() + Sync),
 ) -> Result<[Vec<Vec<GroundDetection>>; 2], AerialError> {
     // A thread keeps its detector.
     let detect = |slot: &mut Option<Detector>, index: usize| -> Result<[Vec<GroundDetection>; 2], AerialError> {
-        let detector = match slot {
-            Some(detector) => detector,
-            None => slot.insert(Detector::shipped(backend)?),
+        let detections = match options.boxes {
+            Boxes::Exact => exact_detections(&scenes[index], &cameras[index]),
+            Boxes::Detected => {
+                let detector = match slot {
+                    Some(detector) => detector,
+                    None => slot.insert(Detector::shipped(backend)?),
+                };
+                let picture = options.footage.picture(&scenes[index], &cameras[index]);
+                detector.detect(&options.footage.searched(picture.image), DETECTED_FROM)?
+            }
         };
-        let picture = footage.picture(&scenes[index], &cameras[index]);
-        let detections = detector.detect(&footage.searched(picture.image), DETECTED_FROM)?;
         on_picture();
         let ground = |is_corrected: bool| -> Vec<GroundDetection> {
             let all = detections.iter().filter_map(|detection| {
                 let seen = raw(&cameras[index], &detection.image_box)?;
-                let height_m = detection.class.typical_dimensions().height_m;
-                let footprint = if is_corrected { corrected(&cameras[index], &seen, height_m) } else { seen };
+                let footprint =
+                    if is_corrected { footprint(&cameras[index], &seen, detection.class, options) } else { seen };
                 Some(GroundDetection { footprint, class: detection.class, score: detection.score })
             });
             all.collect()
@@ -193,6 +234,36 @@ fn detections(
         (0..scenes.len()).into_par_iter().map_init(|| None, detect).collect::<Result<_, AerialError>>()?;
     let (seen, flat) = all.into_iter().map(|[a, b]| (a, b)).unzip();
     Ok([seen, flat])
+}
+
+/// Returns what a perfect detector would find: the exact boxes whose centres lie in the picture.
+/// Motorcycles are no class of the detector.
+fn exact_detections(scene: &AerialScene, camera: &AerialCamera) -> Vec<ImageDetection> {
+    let [width, height] = camera.view().size_px.map(|side| side as f64);
+    let detections = exact_boxes(scene, camera).into_iter().filter_map(|(index, image_box)| {
+        let class = scene.vehicles[index].vehicle.class;
+        let [column, row] = image_box.centre_px;
+        let is_seen =
+            class != VehicleClass::Motorcycle && (0.0..width).contains(&column) && (0.0..height).contains(&row);
+        is_seen.then_some(ImageDetection { image_box, class, score: 1.0 })
+    });
+    detections.collect()
+}
+
+/// Returns the footprint of a vehicle of this class whose visible body covers the box `seen`.
+fn footprint(camera: &AerialCamera, seen: &OrientedBox, class: VehicleClass, options: &FlightOptions) -> OrientedBox {
+    match options.correction {
+        Correction::ClassHeight => corrected(camera, seen, class.typical_dimensions().height_m),
+        Correction::Silhouette => {
+            let [car_m, truck_m] = DETECTED_WIDTH_SIGMA_M;
+            let box_sigma_m = match (options.boxes, class) {
+                (Boxes::Exact, _) => 0.0,
+                (Boxes::Detected, VehicleClass::Truck) => truck_m,
+                (Boxes::Detected, VehicleClass::Car | VehicleClass::Motorcycle) => car_m,
+            };
+            silhouette(camera, seen, &ExpectedSize::of(class).seen_with(box_sigma_m)).0
+        }
+    }
 }
 
 /// Returns the instants of the pictures, all of them multiples of the time between two pictures:

@@ -25,7 +25,7 @@ mod tracker;
 
 pub use detector::{DETECTED_FROM, Detector, ImageDetection, SHIPPED_DETECTOR};
 pub use error::AerialError;
-pub use flight::{FRAME, Flight, FlightOptions, fly, fly_watched};
+pub use flight::{Boxes, Correction, FRAME, Flight, FlightOptions, fly, fly_watched};
 pub use footage::Footage;
 pub use ground::Ground;
 pub use image_box::ImageBox;

@@ -179,6 +179,16 @@ fn shaded([a, b, c]: [Vec3; 3], albedo: [f64; 3], light: Light) -> [f64; 3] {
     albedo.map(|value| value * (sky + light.direct * facing.max(0.0) / to_sun[2].max(0.2)))
 }
 
+/// Returns the exact box around each vehicle, with its index; `None` for a vehicle that is not in
+/// front of the camera.
+pub(crate) fn exact_boxes(scene: &AerialScene, camera: &AerialCamera) -> Vec<(usize, ImageBox)> {
+    let boxes =
+        scene.vehicles.iter().enumerate().filter_map(|(index, vehicle)| {
+            Some((index, label_box(vehicle, &body_triangles(&vehicle.vehicle), camera)?))
+        });
+    boxes.collect()
+}
+
 /// Returns the tight box around the corners of a body, turned to the heading.
 fn label_box(vehicle: &GroundVehicle, triangles: &[BodyTriangle], camera: &AerialCamera) -> Option<ImageBox> {
     let at = camera.project(vehicle.place([0.0; 3]))?;
