@@ -153,7 +153,7 @@ pub(super) fn aerial(args: &AerialArgs) -> Result<ExitCode, CliError> {
     for path in folders.iter().flat_map(|folder| FLIGHT_FILES.map(|name| folder.join(name))) {
         protect(&inputs, &[("--out", Some(&path))])?;
     }
-    check_backend(true)?;
+    check_backend(args.boxes == BoxesChoice::Detected)?;
     let data_sets = args.data.read_all()?;
     let (mut flights, mut summaries) = (Vec::new(), Vec::new());
     for ((number, data), (folder, file)) in (0..).zip(&data_sets).zip(folders.iter().zip(&args.data.files)) {
