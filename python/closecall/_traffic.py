@@ -59,16 +59,18 @@ def criticality(
     *,
     speed_limit_mps: float | None = None,
     ttce_alone: bool = False,
+    curvilinear: bool = False,
     layout: Layout | None = None,
     drop_bad_rows: bool = False,
 ) -> Rows:
     """Computes how critical each lane change of a trajectory file is, as ``closecall traffic criticality`` does.
 
     ``speed_limit_mps`` (m/s) is 120 km/h by default. Each lane change has the keys of :func:`lane_changes` and ``metrics``
-    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``. The result can be read as
-    a table (:class:`Rows`).
+    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``. With ``curvilinear``, the
+    key ``curvilinear`` has the closest encounter along the lanes, ``dce_curvilinear_m`` and ``ttce_curvilinear_s``. The result can be
+    read as a table (:class:`Rows`).
     """
-    named = {"file": file, "speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone}
+    named = {"file": file, "speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone, "curvilinear": curvilinear}
     _, result = call("criticality", {**named, "layout": layout, "drop_bad_rows": drop_bad_rows})
     return Rows(result)
 

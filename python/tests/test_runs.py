@@ -106,6 +106,7 @@ def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> Non
     for found, words in [
         (cc.lane_changes(file), ["traffic", "lane-changes"]),
         (cc.criticality(file, speed_limit_mps=30.0), ["traffic", "criticality", "--speed-limit-mps", "30"]),
+        (cc.criticality(file, curvilinear=True), ["traffic", "criticality", "--curvilinear"]),
         (cc.fit(file, seed=2), ["traffic", "fit", "--seed", "2"]),
     ]:
         assert found == json.loads(command(*words, file, "--format", "json").stdout)

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use closecall_recorded::aerial::dataset::{AerialDatasetOptions, dataset_picture};
-use closecall_recorded::aerial::{Detector, FlightOptions, fly, intersection_over_union, losses};
+use closecall_recorded::aerial::{Boxes, Correction, Detector, FlightOptions, fly, intersection_over_union, losses};
 use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_sensors::camera::Backend;
 use closecall_sensors::datasets::Set;
@@ -114,6 +114,26 @@ fn a_flight_follows_all_vehicles_and_the_correction_removes_the_bias_of_trucks()
     assert!(corrected.abs() < 0.5 * raw, "{corrected} of {raw}");
     let text = result.to_string();
     assert!(["truck corrected", "thw_s", "ID switches"].iter().all(|words| text.contains(words)), "{text}");
+}
+
+#[test]
+fn with_exact_boxes_the_silhouette_places_trucks_of_any_height_and_the_height_of_the_class_does_not() {
+    let truck = vehicle(2, VehicleClass::Truck, (0.0, 22.0), true);
+    let data = TrajectoryData::new("own", Time::from_ms(100), vec![truck]);
+    // The seed chooses the body: boxes of 4 m, and lower coaches, tankers and platforms.
+    let bias_m = |correction, seed| {
+        let boxes = Boxes::Exact;
+        let options = FlightOptions { boxes, correction, seed, offset_sigma_m: 0.0, ..FlightOptions::default() };
+        let result = losses(&[fly(&data, &options, &Backend::Tract).unwrap()]);
+        assert_eq!((result.rows[3].class, result.rows[3].is_corrected), (VehicleClass::Truck, true));
+        assert!(result.rows[3].followed.unwrap() > 0.9, "{:?}", result.rows[3]);
+        result.rows[3].bias_across_m.unwrap()
+    };
+    let seeds = [0, 1, 4, 5, 6, 7];
+    let silhouettes = seeds.map(|seed| bias_m(Correction::Silhouette, seed));
+    assert!(silhouettes.iter().all(|bias_m| bias_m.abs() < 0.08), "{silhouettes:?}");
+    let classes = seeds.map(|seed| bias_m(Correction::ClassHeight, seed));
+    assert!(classes.iter().any(|bias_m| *bias_m < -0.15), "some of the trucks are lower: {classes:?}");
 }
 
 #[test]

@@ -36,8 +36,8 @@ struct Cli {
     command: Command,
 }
 
-/// The commands that may run the camera's network, each as the words that name it.
-const WITH_NETWORK: [&[&str]; 22] = [
+/// The commands that may run the network of a camera, each as the words that name it.
+const WITH_NETWORK: [&[&str]; 23] = [
     &["run"],
     &["campaign"],
     &["replay"],
@@ -46,6 +46,7 @@ const WITH_NETWORK: [&[&str]; 22] = [
     &["plot"],
     &["view"],
     &["check"],
+    &["traffic", "aerial"],
     &["traffic", "chain"],
     &["traffic", "calibrate"],
     &["traffic", "paper"],
@@ -78,7 +79,7 @@ fn with_network(command: clap::Command, path: &[&'static str]) -> clap::Command 
                 .env(ONNXRUNTIME_VARIABLE)
                 .help_heading(heading::EXECUTION)
                 .help(
-                    "Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the \
+                    "Shared library of ONNX Runtime (1.24 or later), to run the camera's network on it instead of the \
                      built-in backend tract. It is loaded only if the network is used",
                 ),
         ),
@@ -168,7 +169,8 @@ enum Command {
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
 /// know them by their name alone.
-const GROUPED: [(&str, &str); 30] = [
+const GROUPED: [(&str, &str); 31] = [
+    ("aerial", "traffic aerial"),
     ("anchor", "study anchor"),
     ("boundary", "study boundary"),
     ("calibrate", "traffic calibrate"),

@@ -6,8 +6,8 @@ use clap::Subcommand;
 use super::command::command;
 use super::help::examples;
 use super::{
-    CliError, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper, perceive,
-    record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
+    CliError, aerial, calibrate, causes, chain, drift, export, fidelity, generate, import, inspect, merge, paper,
+    perceive, record, reenact, render, robustness, sample, schema, sensors, statistics, study, trajectories,
 };
 use crate::exit_code::ExitCode;
 
@@ -50,6 +50,9 @@ pub(super) enum Traffic {
     Record(record::RecordArgs),
     /// Calibrate a car-following model on recorded pairs, and judge it on pairs that were held out
     Calibrate(calibrate::CalibrateArgs),
+    /// Watch the traffic of trajectory files with an aerial camera, derive trajectories from its
+    /// pictures, and compare them with the truth
+    Aerial(aerial::AerialArgs),
 }
 
 /// Results that are computed from many runs and judged by no gate.
@@ -128,6 +131,7 @@ impl Traffic {
             Self::Sample(args) => sample::sample(args),
             Self::Record(args) => record::record(args),
             Self::Calibrate(args) => calibrate::calibrate(args),
+            Self::Aerial(args) => aerial::aerial(args),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod actions;
 mod advice;
+mod aerial;
 mod args;
 mod argument;
 mod arms;

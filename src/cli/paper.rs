@@ -48,7 +48,7 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let index = args.output.join("index.html");
     protect(&of_trajectories(&args.data.files), &[("--out", Some(&index))])?;
     let data_sets = args.data.read_all()?;
-    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
+    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ..Judgement::default() };
     let recorded = data_sets
         .iter()
         .map(|data| RecordedChanges { name: data.name.clone(), changes: criticality(&smooth(data), &judgement) });

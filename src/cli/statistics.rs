@@ -46,7 +46,7 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     }
     let data_sets = args.data.read_all()?;
     let is_in_doubt = data_sets.iter().any(|data| data.is_in_doubt);
-    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
+    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ..Judgement::default() };
     let changes =
         |data: TrajectoryData| RecordedChanges { changes: criticality(&smooth(&data), &judgement), name: data.name };
     let recordings: Vec<RecordedChanges> = data_sets.into_iter().map(changes).collect();

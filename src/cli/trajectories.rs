@@ -113,6 +113,13 @@ pub(super) struct CriticalityArgs {
     #[arg(long, help_heading = heading::METHOD)]
     #[serde(default)]
     ttce_alone: bool,
+    /// Also compute DCE and TTCE along the lanes: a vehicle keeps its speed along the road, completes
+    /// its lane change, and keeps its lateral position then. By default both vehicles keep their
+    /// velocities, which carry a vehicle that changes lanes beyond its new lane. Verdicts and the
+    /// count `any` stay those at constant velocity
+    #[arg(long, help_heading = heading::METHOD)]
+    #[serde(default)]
+    curvilinear: bool,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or the lane change
     /// of the track that --track names
     #[arg(long, value_name = "FILE.rrd", value_parser = trajectory_path, help_heading = heading::OUTPUT)]
@@ -261,7 +268,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     advise_on_lanes(file.doubts_lanes);
     let smoothed = &file.data;
     let speed_limit_mps = args.speed_limit_mps.map(|limit| limit.0);
-    let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone };
+    let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone, curvilinear: args.curvilinear };
     let changes = evaluate(smoothed, &judgement);
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {

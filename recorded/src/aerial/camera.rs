@@ -27,6 +27,11 @@ pub const FOCAL_PX: f64 = 24.0 / 36.0 * WIDTH_PX as f64;
 pub const WIDTH_PX: usize = 1_280;
 /// Rows of a frame: a strip of the image with the road in it.
 pub const HEIGHT_PX: usize = 192;
+/// Columns and rows of the pictures from which the published method derives trajectories.
+pub const PUBLISHED_PX: [usize; 2] = [4_104, 3_006];
+/// Factor by which [`PUBLISHED_PX`] are reduced before the detector searches them. From 100 m, a pixel
+/// then covers 0.11 m of ground at the nadir: the detector knows vehicles of this size.
+pub const PUBLISHED_REDUCTION: usize = 3;
 /// Usual altitude (m).
 pub const ALTITUDE_M: f64 = 100.0;
 /// Usual angle of the optical axis from the nadir (rad): 25°. The drone hovers beside the road, not
@@ -73,6 +78,11 @@ impl View {
             focal_px: FOCAL_PX,
             size_px: [WIDTH_PX, HEIGHT_PX],
         }
+    }
+
+    /// Returns the same view with a lens of the same angle on another number of columns and rows.
+    pub const fn with_size(self, size_px: [usize; 2]) -> Self {
+        Self { focal_px: self.focal_px * size_px[0] as f64 / self.size_px[0] as f64, size_px, ..self }
     }
 }
 
@@ -191,6 +201,17 @@ mod tests {
                 assert!((seen[axis] - ground[axis] - relief[axis]).abs() < 1e-9, "{seen:?} {relief:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_larger_picture_of_the_same_view_shows_the_same_points_at_its_own_pixels() {
+        let view = View::beside_road([250.0, -5.0], ALTITUDE_M, OFF_NADIR_RAD);
+        let [small, large] = [[1_368, 1_000], [4_104, 3_000]].map(|size_px| AerialCamera::new(view.with_size(size_px)));
+        for point in [[250.0, -5.0, 0.0], [221.0, 3.0, 4.0]] {
+            let ([a, b], [c, d]) = (small.project(point).unwrap(), large.project(point).unwrap());
+            assert!((3.0 * a - c).abs() < 1e-9 && (3.0 * b - d).abs() < 1e-9, "{a} {b} {c} {d}");
+        }
+        assert_eq!(view.with_size(view.size_px), view);
     }
 
     #[test]

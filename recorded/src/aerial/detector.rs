@@ -16,7 +16,7 @@ use crate::aerial::overlap::intersection_over_union;
 pub const SHIPPED_DETECTOR: &[u8] = include_bytes!("../../models/aerial-detector.onnx");
 
 /// Pixels of a cell of the output, along each axis.
-const STRIDE: usize = 8;
+pub(crate) const STRIDE: usize = 8;
 /// Numbers for each cell.
 const OUTPUTS: usize = 8;
 /// Sizes to which the network's logarithms refer (px).

@@ -9,9 +9,23 @@
 //! Along each axis of a vehicle of size L and height h, the box that is seen on the ground reaches
 //! from min(−L/2, δ − kL/2) to max(L/2, δ + kL/2), with k = H/(H − h). Its centre lies about δ/2
 //! beside the centre of the footprint: 1 m for a truck of 4 m that is seen at 25° from 100 m.
-//! [`corrected`] inverts this for the typical height of the class. F. Kruber et al. (IV 2020)
-//! correct the same displacement by the height of their test vehicle.
+//! [`corrected`] inverts this for a known height. F. Kruber et al. (IV 2020) correct the same
+//! displacement by the height of their test vehicle.
+//!
+//! The height of other vehicles is not known. [`silhouette`] estimates the height of each vehicle from
+//! its box: the box is wider by about δ than the vehicle, and the widths of a class differ less than
+//! its heights. With the expected width w₀ ± σ_w and height h₀ ± σ_h, the estimate has the smallest
+//!
+//! ```text
+//!   ((w(h) − w₀) / σ_w)² + ((h − h₀) / σ_h)²        w(h): width of the footprint that a height of h leaves
+//! ```
+//!
+//! That is the most probable height if both are normal. σ_w holds the error of the box, too: where the
+//! box says little about the width, or the view is steep, the expected height remains.
 
+use std::ops::RangeInclusive;
+
+use closecall_traffic::VehicleClass;
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::maths;
 use nalgebra::Vector2;
@@ -23,6 +37,50 @@ use crate::aerial::image_box::ImageBox;
 const STEPS: usize = 12;
 /// Least size that is left of a box (m).
 const SMALLEST_M: f64 = 0.3;
+/// Steps of the search for the height: w(h) is almost linear.
+const HEIGHT_STEPS: usize = 4;
+/// Difference of two heights from which the slope of w(h) is computed (m).
+const SLOPE_M: f64 = 0.05;
+
+/// What is known of the size of a vehicle before it is seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpectedSize {
+    /// Mean width (m).
+    pub width_m: f64,
+    /// Standard deviation of the widths (m).
+    pub width_sigma_m: f64,
+    /// Mean height (m).
+    pub height_m: f64,
+    /// Standard deviation of the heights (m).
+    pub height_sigma_m: f64,
+    /// Possible heights (m).
+    pub heights_m: RangeInclusive<f64>,
+}
+
+impl ExpectedSize {
+    /// Returns the expected size of a class.
+    ///
+    /// - Cars: new cars of 2023 in the EU are 1.80 m wide on average, 1.78 m in 2018 (Transport &
+    ///   Environment, 2024). The spread, and heights from low coupés to panel vans, are assumptions
+    ///   with plausible ranges of 0.08 to 0.12 m and 0.2 to 0.35 m.
+    /// - Trucks and coaches: at most 2.55 m wide and 4.00 m high (Directive 96/53/EC, annex I). Rigid
+    ///   trucks are lower. Mean and spread are assumptions with plausible ranges of 2.45 to 2.55 ± 0.05
+    ///   to 0.1 m, and 3.4 to 3.8 ± 0.3 to 0.5 m.
+    pub fn of(class: VehicleClass) -> Self {
+        let (width_m, width_sigma_m, height_m, height_sigma_m, heights_m) = match class {
+            VehicleClass::Car => (1.80, 0.10, 1.5, 0.25, 1.2..=2.8),
+            VehicleClass::Truck => (2.50, 0.08, 3.6, 0.4, 2.0..=4.0),
+            VehicleClass::Motorcycle => (0.80, 0.10, 1.6, 0.15, 1.2..=2.0),
+        };
+        Self { width_m, width_sigma_m, height_m, height_sigma_m, heights_m }
+    }
+
+    /// Returns the same size for boxes whose width has an error of this standard deviation (m).
+    #[must_use]
+    pub fn seen_with(self, box_sigma_m: f64) -> Self {
+        Self { width_sigma_m: maths::hypot(self.width_sigma_m, box_sigma_m), ..self }
+    }
+}
 
 /// Returns the box on the ground that an image box covers, as if the vehicle were flat. `None` if a
 /// corner lies above the horizon.
@@ -79,10 +137,26 @@ pub fn corrected(camera: &AerialCamera, seen_m: &OrientedBox, height_m: f64) -> 
     estimate
 }
 
+/// Returns the footprint whose visible body covers the box `seen_m`, and the height of the vehicle (m),
+/// which is estimated from the width of the box.
+pub fn silhouette(camera: &AerialCamera, seen_m: &OrientedBox, expected: &ExpectedSize) -> (OrientedBox, f64) {
+    let width_m = |height_m: f64| corrected(camera, seen_m, height_m).width_m;
+    let [width_weight, height_weight] =
+        [expected.width_sigma_m, expected.height_sigma_m].map(|sigma_m| 1.0 / (sigma_m * sigma_m));
+    let mut height_m = expected.height_m;
+    for _ in 0..HEIGHT_STEPS {
+        let left_m = width_m(height_m);
+        let slope = (width_m(height_m + SLOPE_M) - left_m) / SLOPE_M;
+        // The minimum of the sum of squares, with w(h') = left + slope·(h' − h).
+        let wanted = width_weight * slope * (expected.width_m - left_m + slope * height_m);
+        height_m = (wanted + height_weight * expected.height_m) / (width_weight * slope * slope + height_weight);
+        height_m = height_m.clamp(*expected.heights_m.start(), *expected.heights_m.end());
+    }
+    (corrected(camera, seen_m, height_m), height_m)
+}
+
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::VehicleClass;
-
     use super::*;
     use crate::aerial::camera::{ALTITUDE_M, OFF_NADIR_RAD, View};
 
@@ -143,6 +217,83 @@ mod tests {
             let back = corrected(&camera, &visible, HEIGHT_M);
             assert!(maths::hypot(back.x_m - x_m, back.y_m - y_m) < 1e-6, "{back:?}");
             assert!((back.length_m - 16.5).abs() < 1e-6 && (back.width_m - 2.55).abs() < 1e-6, "{back:?}");
+        }
+    }
+
+    /// What is expected of trucks whose width is known exactly, or of which nothing is known but the
+    /// height.
+    fn trucks(width_sigma_m: f64, height_sigma_m: f64) -> ExpectedSize {
+        ExpectedSize { width_m: 2.55, width_sigma_m, height_sigma_m, ..ExpectedSize::of(VehicleClass::Truck) }
+    }
+
+    #[test]
+    fn a_known_width_gives_the_height_and_the_place_of_a_low_truck() {
+        let camera = camera();
+        for (x_m, y_m, height_m) in [(250.0, -5.0, 3.2), (215.0, -8.0, 2.4), (300.0, -1.0, 3.9)] {
+            let footprint = truck(x_m, y_m);
+            let visible = seen(&camera, &footprint, height_m);
+            let (place, estimated_m) = silhouette(&camera, &visible, &trucks(1e-4, 1.0));
+            assert!((estimated_m - height_m).abs() < 1e-3, "{estimated_m} instead of {height_m}");
+            assert!(maths::hypot(place.x_m - x_m, place.y_m - y_m) < 1e-3, "{place:?}");
+            assert!((place.width_m - 2.55).abs() < 1e-3 && (place.length_m - 16.5).abs() < 1e-3, "{place:?}");
+            // The height of the class takes away too much: half of the difference of both
+            // displacements, and of the growth of half the width.
+            let at_class = corrected(&camera, &visible, HEIGHT_M);
+            let half_m = |height_m: f64| {
+                let growth = ALTITUDE_M / (ALTITUDE_M - height_m);
+                0.5 * (camera.relief_m([x_m, y_m], height_m)[1] + 0.5 * (growth - 1.0) * 2.55)
+            };
+            let wrong_m = half_m(height_m) - half_m(HEIGHT_M);
+            assert!((at_class.y_m - y_m - wrong_m).abs() < 0.02 && wrong_m < 0.0, "{at_class:?} {wrong_m}");
+        }
+    }
+
+    #[test]
+    fn a_box_that_says_nothing_of_the_width_leaves_the_expected_height() {
+        let camera = camera();
+        let visible = seen(&camera, &truck(250.0, -5.0), 3.0);
+        let (place, height_m) = silhouette(&camera, &visible, &trucks(1e3, 0.4));
+        assert!((height_m - 3.6).abs() < 1e-4, "{height_m}");
+        let expected = corrected(&camera, &visible, 3.6);
+        assert!(
+            (place.y_m - expected.y_m).abs() < 1e-4 && (place.width_m - expected.width_m).abs() < 1e-4,
+            "{place:?}"
+        );
+        let coarse = ExpectedSize::of(VehicleClass::Truck).seen_with(0.06);
+        assert!((coarse.width_sigma_m - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_equal_weights_give_the_mean_of_both_heights() {
+        // Where w(h) has the slope s, a width that is known to σ_w tells the height to σ_w / |s|.
+        let camera = camera();
+        let visible = seen(&camera, &truck(250.0, -5.0), 3.2);
+        let width_m = |height_m: f64| corrected(&camera, &visible, height_m).width_m;
+        let slope = (width_m(3.6) - width_m(3.2)) / 0.4;
+        assert!((-0.6..-0.4).contains(&slope), "about the tangent of the angle of the view: {slope}");
+        let (_, height_m) = silhouette(&camera, &visible, &trucks(0.4 * slope.abs(), 0.4));
+        assert!((height_m - 3.4).abs() < 0.01, "{height_m}");
+    }
+
+    #[test]
+    fn from_straight_above_the_width_says_little_of_the_height() {
+        let above = AerialCamera::new(View::beside_road([250.0, -5.0], ALTITUDE_M, 0.0));
+        let visible = seen(&above, &truck(250.0, -5.0), 3.0);
+        let (place, height_m) = silhouette(&above, &visible, &trucks(0.3, 0.4));
+        assert!((height_m - 3.6).abs() < 0.03, "{height_m}");
+        assert!((place.y_m + 5.0).abs() < 1e-6, "no displacement at the nadir: {place:?}");
+    }
+
+    #[test]
+    fn no_box_makes_a_vehicle_higher_than_vehicles_are() {
+        let camera = camera();
+        let wide = OrientedBox { width_m: 9.0, ..truck(250.0, -5.0) };
+        let narrow = OrientedBox { width_m: 1.0, ..wide };
+        // A box that is narrower than any vehicle says nothing.
+        for (visible, heights_m) in [(wide, 4.0..=4.0), (narrow, 2.0..=3.7)] {
+            let (place, height_m) = silhouette(&camera, &visible, &trucks(1e-3, 5.0));
+            assert!(heights_m.contains(&height_m), "{height_m}");
+            assert!(place.width_m.is_finite() && place.width_m > 0.0, "{place:?}");
         }
     }
 

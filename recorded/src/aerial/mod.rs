@@ -11,6 +11,7 @@ pub mod dataset;
 mod detector;
 mod error;
 mod flight;
+mod footage;
 pub mod footprint;
 mod ground;
 mod image_box;
@@ -24,7 +25,8 @@ mod tracker;
 
 pub use detector::{DETECTED_FROM, Detector, ImageDetection, SHIPPED_DETECTOR};
 pub use error::AerialError;
-pub use flight::{FRAME, Flight, FlightOptions, fly};
+pub use flight::{Boxes, Correction, FRAME, Flight, FlightOptions, fly, fly_watched};
+pub use footage::Footage;
 pub use ground::Ground;
 pub use image_box::ImageBox;
 pub use losses::{CriterionLoss, LossRow, Losses, MetricLoss, losses};

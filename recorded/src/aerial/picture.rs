@@ -8,7 +8,7 @@ use crate::aerial::ground::{Ground, unit};
 use crate::aerial::image_box::ImageBox;
 use crate::aerial::raster::{Corner, Samples};
 
-/// Samples for each pixel along each axis.
+/// Samples for each pixel along each axis, unless the picture is reduced afterwards.
 const SAMPLES: usize = 2;
 /// Share of a box's area that has to show the vehicle, so that the label counts as visible.
 const VISIBLE_SHARE: f64 = 0.35;
@@ -99,8 +99,13 @@ pub struct AerialPicture {
 
 /// Renders a picture. The same scene and camera give the same bytes.
 pub fn render(scene: &AerialScene, camera: &AerialCamera) -> AerialPicture {
+    render_sampled(scene, camera, SAMPLES)
+}
+
+/// Renders a picture with this number of samples for each pixel along each axis.
+pub(crate) fn render_sampled(scene: &AerialScene, camera: &AerialCamera, per_axis: usize) -> AerialPicture {
     let [width, height] = camera.view().size_px;
-    let mut samples = Samples::new(width * SAMPLES, height * SAMPLES);
+    let mut samples = Samples::new(width * per_axis, height * per_axis);
     let mut colours: Vec<([f64; 3], usize)> = vec![([0.0; 3], usize::MAX)];
     let mut labels = Vec::new();
     for (index, vehicle) in scene.vehicles.iter().enumerate() {
@@ -108,7 +113,7 @@ pub fn render(scene: &AerialScene, camera: &AerialCamera) -> AerialPicture {
         if let Some(image_box) = label_box(vehicle, &triangles, camera) {
             labels.push((index, Label { id: vehicle.id, image_box, is_visible: false }));
         }
-        draw_body(scene, camera, (vehicle, &triangles, index), (&mut samples, &mut colours));
+        draw_body(scene, camera, (vehicle, &triangles, index), (&mut samples, &mut colours), per_axis);
     }
     let mut shown = vec![0_usize; scene.vehicles.len()];
     for face in &samples.face {
@@ -117,11 +122,11 @@ pub fn render(scene: &AerialScene, camera: &AerialCamera) -> AerialPicture {
         }
     }
     let labels = labels.into_iter().map(|(index, label)| {
-        let area = label.image_box.length_px * label.image_box.width_px * (SAMPLES * SAMPLES) as f64;
+        let area = label.image_box.length_px * label.image_box.width_px * (per_axis * per_axis) as f64;
         Label { is_visible: shown[index] as f64 >= VISIBLE_SHARE * area, ..label }
     });
     let labels = labels.collect();
-    AerialPicture { image: develop(scene, camera, &samples, &colours), labels }
+    AerialPicture { image: develop(scene, camera, &samples, &colours, per_axis), labels }
 }
 
 /// Draws the body of a vehicle and its shadow; each face gets a colour.
@@ -130,12 +135,13 @@ fn draw_body(
     camera: &AerialCamera,
     (vehicle, triangles, index): (&GroundVehicle, &[BodyTriangle], usize),
     (samples, colours): (&mut Samples, &mut Vec<([f64; 3], usize)>),
+    per_axis: usize,
 ) {
     let to_sun = scene.light.to_sun();
     let on_ground = |p: Vec3| [p[0] - to_sun[0] * p[2] / to_sun[2], p[1] - to_sun[1] * p[2] / to_sun[2], 0.0];
     let sampled = |point: Vec3| -> Option<Corner> {
         let [column, row, depth] = camera.project_with_depth(point)?;
-        Some([column * SAMPLES as f64, row * SAMPLES as f64, depth])
+        Some([column * per_axis as f64, row * per_axis as f64, depth])
     };
     let corners = |points: [Vec3; 3]| -> Option<[Corner; 3]> {
         let [a, b, c] = points.map(&sampled);
@@ -173,6 +179,16 @@ fn shaded([a, b, c]: [Vec3; 3], albedo: [f64; 3], light: Light) -> [f64; 3] {
     albedo.map(|value| value * (sky + light.direct * facing.max(0.0) / to_sun[2].max(0.2)))
 }
 
+/// Returns the exact box around each vehicle, with its index; `None` for a vehicle that is not in
+/// front of the camera.
+pub(crate) fn exact_boxes(scene: &AerialScene, camera: &AerialCamera) -> Vec<(usize, ImageBox)> {
+    let boxes =
+        scene.vehicles.iter().enumerate().filter_map(|(index, vehicle)| {
+            Some((index, label_box(vehicle, &body_triangles(&vehicle.vehicle), camera)?))
+        });
+    boxes.collect()
+}
+
 /// Returns the tight box around the corners of a body, turned to the heading.
 fn label_box(vehicle: &GroundVehicle, triangles: &[BodyTriangle], camera: &AerialCamera) -> Option<ImageBox> {
     let at = camera.project(vehicle.place([0.0; 3]))?;
@@ -185,7 +201,13 @@ fn label_box(vehicle: &GroundVehicle, triangles: &[BodyTriangle], camera: &Aeria
 }
 
 /// Turns samples into an image: colours, the mean of the samples of each pixel, gamma, noise.
-fn develop(scene: &AerialScene, camera: &AerialCamera, samples: &Samples, colours: &[([f64; 3], usize)]) -> Image {
+fn develop(
+    scene: &AerialScene,
+    camera: &AerialCamera,
+    samples: &Samples,
+    colours: &[([f64; 3], usize)],
+    per_axis: usize,
+) -> Image {
     /// Linear value that saturates the sensor at exposure 1.
     const WHITE: f64 = 0.75;
     let [width, height] = camera.view().size_px;
@@ -194,12 +216,12 @@ fn develop(scene: &AerialScene, camera: &AerialCamera, samples: &Samples, colour
     for row in 0..height {
         for column in 0..width {
             let mut sum = [0.0; 3];
-            let grid = (0..SAMPLES).flat_map(|dy| (0..SAMPLES).map(move |dx| (dx, dy)));
+            let grid = (0..per_axis).flat_map(|dy| (0..per_axis).map(move |dx| (dx, dy)));
             for (dx, dy) in grid {
-                let index = (row * SAMPLES + dy) * width * SAMPLES + column * SAMPLES + dx;
+                let index = (row * per_axis + dy) * width * per_axis + column * per_axis + dx;
                 let colour = match samples.face[index] {
                     0 => {
-                        let offset = |part: usize| (part as f64 + 0.5) / SAMPLES as f64;
+                        let offset = |part: usize| (part as f64 + 0.5) / per_axis as f64;
                         let at = camera.ground_at([column as f64 + offset(dx), row as f64 + offset(dy)]);
                         let light = if samples.is_shadowed[index] { sky } else { 1.0 };
                         at.map_or([0.6; 3], |at| scene.ground.albedo(at).map(|value| value * light))
@@ -209,7 +231,7 @@ fn develop(scene: &AerialScene, camera: &AerialCamera, samples: &Samples, colour
                 (0..3).for_each(|channel| sum[channel] += colour[channel]);
             }
             for (channel, sum) in sum.iter().enumerate() {
-                let linear = scene.light.exposure * sum / ((SAMPLES * SAMPLES) as f64 * WHITE);
+                let linear = scene.light.exposure * sum / ((per_axis * per_axis) as f64 * WHITE);
                 let noise = gaussian(scene.key, row * width + column, channel);
                 let encoded = 255.0 * linear.max(0.0).sqrt() + NOISE * noise;
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]

@@ -2,15 +2,16 @@
 
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{
-    CRITICAL_THW_S, Moving, bumper_gap_m, closest_encounter, required_deceleration_mps2, time_headway_s,
-    time_to_collision_s,
+    CRITICAL_THW_S, Encounter, Moving, Settling, bumper_gap_m, closest_encounter, curvilinear_encounter,
+    required_deceleration_mps2, time_headway_s, time_to_collision_s,
 };
 use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint, maths};
 
+use super::running::RunningChanges;
 use super::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
-    CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, Evaluation, FollowingMetrics,
-    MetricResult, Metrics,
+    CRITICAL_TTCE_S, CriticalLaneChange, CurvilinearMetrics, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, Evaluation,
+    FollowingMetrics, MetricResult, Metrics,
 };
 use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::{LaneChange, detect};
@@ -33,16 +34,23 @@ pub struct Judgement {
     /// True if a short TTCE is critical by itself. Otherwise TTCE only decides whether DCE is
     /// evaluated.
     pub ttce_alone: bool,
+    /// True if the encounters along the lanes are computed, too ([`CurvilinearMetrics`]). They change
+    /// no other value.
+    pub curvilinear: bool,
 }
 
 /// Detects all lane changes of `data` and evaluates their metrics.
 pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<CriticalLaneChange> {
-    let traffic = Traffic { data, carriageways: &Carriageways::of(data.trajectories()) };
-    let evaluated = detect(data).into_iter().filter_map(|lane_change| {
-        let Evaluation { metrics, following } = evaluate(traffic, &lane_change, window(&lane_change), judgement)?;
+    let lane_changes = detect(data);
+    let running = judgement.curvilinear.then(|| RunningChanges::of(data, &lane_changes));
+    let carriageways = &Carriageways::of(data.trajectories());
+    let traffic = Traffic { data, carriageways, running: running.as_ref() };
+    let evaluated = lane_changes.into_iter().filter_map(|lane_change| {
+        let Evaluation { metrics, following, curvilinear } =
+            evaluate(traffic, &lane_change, window(&lane_change), judgement)?;
         let instant = instant_of_crossing(data, &lane_change)?;
         let at_crossing = evaluate(traffic, &lane_change, [instant, instant], judgement)?;
-        Some(CriticalLaneChange { lane_change, metrics, following, at_crossing })
+        Some(CriticalLaneChange { lane_change, metrics, following, curvilinear, at_crossing })
     });
     evaluated.collect()
 }
@@ -62,7 +70,7 @@ fn instant_of_crossing(data: &SmoothedTrajectoryData, lane_change: &LaneChange) 
 
 /// Returns the first and the last instant of a lane change. The estimated manoeuvre may end before
 /// the crossing, or begin after it: the crossing belongs to the window.
-fn window(lane_change: &LaneChange) -> [Time; 2] {
+pub(super) fn window(lane_change: &LaneChange) -> [Time; 2] {
     let LaneChange { start_s, crossing_s, end_s, .. } = *lane_change;
     [Time::from_s(start_s.min(crossing_s)), Time::from_s(end_s.max(crossing_s))]
 }
@@ -72,12 +80,14 @@ fn window(lane_change: &LaneChange) -> [Time; 2] {
 struct Traffic<'a> {
     data: &'a SmoothedTrajectoryData,
     carriageways: &'a Carriageways,
+    /// The lane changes that the vehicles complete, if encounters along the lanes are asked for.
+    running: Option<&'a RunningChanges>,
 }
 
 /// Evaluates the metrics of one lane change from the first to the last instant of a window. Returns
 /// `None` if `data` does not have its track.
 fn evaluate(
-    Traffic { data, carriageways }: Traffic<'_>,
+    Traffic { data, carriageways, running }: Traffic<'_>,
     lane_change: &LaneChange,
     [start, end]: [Time; 2],
     judgement: &Judgement,
@@ -90,9 +100,14 @@ fn evaluate(
         let others = others.map(|&presence| VehicleState::new(data.look_up(presence)));
         let is_opponent = |other: &VehicleState<'_>| carriageways.share(other.point.d_m, point.d_m);
         let others: Vec<VehicleState<'_>> = others.filter(is_opponent).collect();
-        extremes.observe(&VehicleState::new((ego, point)), &others, Lane(lane_change.to_lane));
+        let ego = VehicleState::new((ego, point));
+        extremes.observe(&ego, &others, Lane(lane_change.to_lane));
+        if let Some(running) = running {
+            extremes.observe_curvilinear(&ego, &others, running);
+        }
     }
-    Some(Evaluation { metrics: extremes.metrics(judgement), following: extremes.following() })
+    let curvilinear = running.map(|_| extremes.curvilinear(judgement));
+    Some(Evaluation { metrics: extremes.metrics(judgement), following: extremes.following(), curvilinear })
 }
 
 /// The state of one vehicle at one instant.
@@ -110,6 +125,17 @@ impl<'a> VehicleState<'a> {
         let (length_m, width_m) = (track.dimensions.length_m, track.dimensions.width_m);
         let shape = OrientedBox { x_m: point.s_m, y_m: point.d_m, yaw_rad, length_m, width_m };
         Self { track, point, moving: Moving { shape, vx_mps, vy_mps } }
+    }
+
+    /// Returns the movement of a vehicle that completes its lane change, if one is running, and else
+    /// keeps its lateral position.
+    fn settling(&self, running: &RunningChanges) -> Settling {
+        let to_go_m = running.end_m(self.track.track_id, self.point.time).map(|end_m| end_m - self.point.d_m);
+        let lateral_mps = self.moving.vy_mps;
+        // A vehicle that moves away from where its lane change ended does not complete it yet.
+        let completes_after_s =
+            to_go_m.filter(|to_go_m| to_go_m * lateral_mps > 0.0).map(|to_go_m| to_go_m / lateral_mps);
+        Settling { moving: self.moving, settles_after_s: completes_after_s.unwrap_or(0.0) }
     }
 
     /// Returns the gap from this vehicle's front to the rear of `other` (m), or `None` if `other`
@@ -165,6 +191,45 @@ fn keep_larger(kept: &mut Option<Extreme>, new: Extreme) {
     }
 }
 
+/// The most critical encounters over a window, by one motion model.
+#[derive(Default)]
+struct EncounterExtremes {
+    dce: Option<Extreme>,
+    ttce: Option<Extreme>,
+    has_encounter_beyond_horizon: bool,
+}
+
+impl EncounterExtremes {
+    /// Updates both extremes with an encounter. `against` turns a value into an extreme.
+    fn observe(&mut self, encounter: Result<Encounter, Absent>, against: impl Fn(f64) -> Extreme) {
+        match encounter {
+            Ok(encounter) => {
+                keep_smaller(&mut self.ttce, against(encounter.ttce_s));
+                if encounter.ttce_s < CRITICAL_TTCE_S {
+                    keep_smaller(&mut self.dce, against(encounter.dce_m));
+                }
+            }
+            Err(reason) => self.has_encounter_beyond_horizon |= reason == Absent::BeyondHorizon,
+        }
+    }
+
+    /// Returns the results of DCE and TTCE.
+    fn results(&self, has_opponent: bool, judgement: &Judgement) -> [MetricResult; 2] {
+        let no_ttce = match (has_opponent, self.has_encounter_beyond_horizon) {
+            (false, _) => Absent::NoOpponent,
+            (true, true) => Absent::BeyondHorizon,
+            (true, false) => Absent::NotApproaching,
+        };
+        // If there are encounters, but none near enough in time, DCE is absent because of the
+        // horizon.
+        let no_dce = if self.ttce.is_some() { Absent::BeyondHorizon } else { no_ttce };
+        [
+            metric_record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
+            metric_record(self.ttce, no_ttce, |value| judgement.ttce_alone && value < CRITICAL_TTCE_S),
+        ]
+    }
+}
+
 /// The most critical values of all metrics over a window.
 #[derive(Default)]
 struct Extremes {
@@ -176,11 +241,12 @@ struct Extremes {
     ttc: Option<Extreme>,
     drac: Option<Extreme>,
     has_lead: bool,
-    dce: Option<Extreme>,
-    ttce: Option<Extreme>,
+    /// At constant velocity.
+    straight: EncounterExtremes,
+    /// Along the lanes.
+    curvilinear: EncounterExtremes,
     has_opponent: bool,
     was_standing_behind_lead: bool,
-    has_encounter_beyond_horizon: bool,
 }
 
 impl Extremes {
@@ -197,15 +263,17 @@ impl Extremes {
             self.has_opponent = true;
             let against = |value| Extreme { value, opponent: Some(other.track.track_id), time_s };
             keep_smaller(&mut self.distance, against(ego.moving.shape.distance_m(&other.moving.shape)));
-            match closest_encounter(&ego.moving, &other.moving, ENCOUNTER_HORIZON_S) {
-                Ok(encounter) => {
-                    keep_smaller(&mut self.ttce, against(encounter.ttce_s));
-                    if encounter.ttce_s < CRITICAL_TTCE_S {
-                        keep_smaller(&mut self.dce, against(encounter.dce_m));
-                    }
-                }
-                Err(reason) => self.has_encounter_beyond_horizon |= reason == Absent::BeyondHorizon,
-            }
+            self.straight.observe(closest_encounter(&ego.moving, &other.moving, ENCOUNTER_HORIZON_S), against);
+        }
+    }
+
+    /// Updates the encounters along the lanes with the vehicles at one instant.
+    fn observe_curvilinear(&mut self, ego: &VehicleState<'_>, others: &[VehicleState<'_>], running: &RunningChanges) {
+        let own = ego.settling(running);
+        for other in others {
+            let (opponent, time_s) = (Some(other.track.track_id), ego.point.time.s());
+            let encounter = curvilinear_encounter(&own, &other.settling(running), ENCOUNTER_HORIZON_S);
+            self.curvilinear.observe(encounter, |value| Extreme { value, opponent, time_s });
         }
     }
 
@@ -251,25 +319,23 @@ impl Extremes {
         }
     }
 
+    fn curvilinear(&self, judgement: &Judgement) -> CurvilinearMetrics {
+        let [dce_curvilinear_m, ttce_curvilinear_s] = self.curvilinear.results(self.has_opponent, judgement);
+        CurvilinearMetrics { dce_curvilinear_m, ttce_curvilinear_s }
+    }
+
     fn metrics(&self, judgement: &Judgement) -> Metrics {
         let speed_limit_mps = judgement.speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS);
         let no_lead = if self.was_standing_behind_lead { Absent::Standstill } else { Absent::NoLead };
-        let no_ttce = match (self.has_opponent, self.has_encounter_beyond_horizon) {
-            (false, _) => Absent::NoOpponent,
-            (true, true) => Absent::BeyondHorizon,
-            (true, false) => Absent::NotApproaching,
-        };
-        // If there are encounters, but none near enough in time, DCE is absent because of the
-        // horizon.
-        let no_dce = if self.ttce.is_some() { Absent::BeyondHorizon } else { no_ttce };
+        let [dce_m, ttce_s] = self.straight.results(self.has_opponent, judgement);
         Metrics {
             distance_m: metric_record(self.distance, Absent::NoOpponent, |value| value < CRITICAL_DISTANCE_M),
             speed_mps: magnitude_record(self.speed, IMPLAUSIBLE_MPS, CRITICAL_SPEED_FACTOR * speed_limit_mps),
             a_lon_mps2: magnitude_record(self.a_lon, IMPLAUSIBLE_MPS2, CRITICAL_A_LON_MPS2),
             a_lat_mps2: magnitude_record(self.a_lat, IMPLAUSIBLE_MPS2, CRITICAL_A_LAT_MPS2),
             thw_s: metric_record(self.thw, no_lead, |value| value < CRITICAL_THW_S),
-            dce_m: metric_record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
-            ttce_s: metric_record(self.ttce, no_ttce, |value| judgement.ttce_alone && value < CRITICAL_TTCE_S),
+            dce_m,
+            ttce_s,
         }
     }
 }
@@ -381,6 +447,100 @@ mod tests {
         }
     }
 
+    /// The metrics by both motion models of a lane change from lane 3 to lane 2 between 3 and 8 s at
+    /// 30 m/s, against one other vehicle.
+    fn both_models(other: Trajectory) -> (Metrics, CurvilinearMetrics) {
+        let tracks = vec![changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 5.0), 110), other];
+        let judgement = Judgement { curvilinear: true, ..Judgement::default() };
+        let change = criticality(&smooth(&trajectory_data_of(tracks)), &judgement).remove(0);
+        (change.metrics, change.curvilinear.unwrap())
+    }
+
+    #[test]
+    fn a_vehicle_beyond_the_new_lane_is_near_at_constant_velocity_and_not_along_the_lanes() {
+        // A slower vehicle drives in lane 1. In the middle of the lane change, the lateral speed of
+        // 1.3 m/s carries the vehicle that changes lanes by 3.3 m until it has passed, 2.5 s later.
+        let (straight, along) = both_models(straight_track(2, 75.5, 20.0, -1.75, 110));
+        assert!(straight.dce_m.is_critical(), "{straight:?}");
+        // Both are 1.8 m wide, and 3.5 m apart in their lanes: 1.7 m. Until it is in its new lane, the
+        // box is turned to the left by up to 1.6 degrees: its corner reaches 0.06 m further.
+        let along_m = along.dce_curvilinear_m.value().unwrap();
+        assert!((1.6..1.75).contains(&along_m) && !along.dce_curvilinear_m.is_critical(), "{along_m}");
+    }
+
+    #[test]
+    fn a_slower_vehicle_in_the_new_lane_is_a_collision_course_along_the_lanes() {
+        let (_, along) = both_models(straight_track(2, 80.0, 20.0, -5.25, 110));
+        assert_eq!(along.dce_curvilinear_m.value(), Some(0.0));
+        assert!(along.dce_curvilinear_m.is_critical() && along.ttce_curvilinear_s.value().unwrap() < 2.6, "{along:?}");
+        assert!(!along.ttce_curvilinear_s.is_critical(), "TTCE is the gate of DCE");
+    }
+
+    #[test]
+    fn a_vehicle_that_sways_keeps_its_lateral_position_along_the_lanes() {
+        // A faster vehicle passes in lane 4, and sways by 0.3 m at up to 0.9 m/s.
+        let mut swaying = straight_track(2, -70.0, 38.0, -12.25, 110);
+        for (k, point) in swaying.points.iter_mut().enumerate() {
+            let phase = 0.3 * k as f64;
+            point.d_m -= 0.3 * maths::sin(phase);
+            point.lateral_speed_mps -= 0.9 * maths::cos(phase);
+        }
+        let (straight, along) = both_models(swaying);
+        let (straight_m, along_m) = (straight.dce_m.value().unwrap(), along.dce_curvilinear_m.value().unwrap());
+        // 7 m between the lanes, less the sway and the width of a vehicle.
+        assert!((along_m - 4.9).abs() < 0.15, "{along_m}");
+        assert!(straight_m < along_m - 0.5, "{straight_m} {along_m}");
+    }
+
+    #[test]
+    fn metrics_along_the_lanes_are_there_only_if_asked_for_and_change_no_other_value() {
+        let tracks = || {
+            vec![
+                changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110),
+                straight_track(2, -70.0, 38.0, -1.75, 110),
+            ]
+        };
+        let by = |curvilinear| {
+            let judgement = Judgement { curvilinear, ..Judgement::default() };
+            criticality(&smooth(&trajectory_data_of(tracks())), &judgement).remove(0)
+        };
+        let (without, with) = (by(false), by(true));
+        assert_eq!((without.metrics, without.following), (with.metrics, with.following));
+        assert_eq!(without.at_crossing.metrics, with.at_crossing.metrics);
+        let [without, with] = [without, with].map(|change| serde_json::to_value(change).unwrap());
+        assert!(without.get("curvilinear").is_none() && without["at_crossing"].get("dce_curvilinear_m").is_none());
+        assert!(with["curvilinear"]["dce_curvilinear_m"]["value"].is_number(), "{with}");
+        assert!(with["at_crossing"]["ttce_curvilinear_s"]["value"].is_number(), "{with}");
+        let names: Vec<_> = by(true).named().map(|(name, ..)| name).collect();
+        assert_eq!((names.len(), names[9], names[10]), (11, "dce_curvilinear_m", "ttce_curvilinear_s"));
+        assert_eq!(by(false).named().count(), 9);
+        let alone = criticality(
+            &smooth(&trajectory_data_of(tracks()[..1].to_vec())),
+            &Judgement { curvilinear: true, ..Judgement::default() },
+        );
+        assert_eq!(absent(alone[0].curvilinear.unwrap().dce_curvilinear_m), Some(Absent::NoOpponent));
+    }
+
+    #[test]
+    fn the_shares_state_encounters_along_the_lanes_apart_and_do_not_count_them() {
+        // DCE is critical at constant velocity only.
+        let tracks = vec![
+            changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 5.0), 110),
+            straight_track(2, 75.5, 20.0, -1.75, 110),
+        ];
+        let data = smooth(&trajectory_data_of(tracks));
+        let by = |curvilinear| {
+            shares(&criticality(&data, &Judgement { curvilinear, ..Judgement::default() }), Counted::Complete)
+        };
+        let (without, with) = (by(false), by(true));
+        assert_eq!((without.metrics.len(), with.metrics.len()), (7, 9));
+        assert_eq!(without.metrics, with.metrics[..7]);
+        assert_eq!((without.any, with.any), (1, 1));
+        let [dce, ttce] = &with.metrics[7..] else { panic!("two metrics along the lanes") };
+        assert_eq!((dce.metric, dce.critical, dce.absent), ("dce_curvilinear_m", 0, 0));
+        assert_eq!((ttce.metric, ttce.critical), ("ttce_curvilinear_s", 0));
+    }
+
     #[test]
     fn the_window_contains_the_crossing() {
         // A vehicle ahead in the target lane brakes hard, so that the headway falls with time.
@@ -391,7 +551,7 @@ mod tests {
         let ego = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let data = smooth(&trajectory_data_of(vec![ego, lead]));
         let whole = detect(&data).remove(0);
-        let traffic = Traffic { data: &data, carriageways: &Carriageways::default() };
+        let traffic = Traffic { data: &data, carriageways: &Carriageways::default(), running: None };
         let thw_s = |change: &LaneChange| {
             let evaluation = evaluate(traffic, change, window(change), &Judgement::default()).unwrap();
             evaluation.metrics.thw_s.value().unwrap()

@@ -33,6 +33,15 @@
 //!   ahead. DCE is evaluated only if TTCE < 2.6 s. A short TTCE is not critical by itself, unless
 //!   [`Judgement::ttce_alone`] asks for it: vehicles that pass each other at a safe distance have
 //!   one, too.
+//! - **Encounters along the lanes**, only if [`Judgement::curvilinear`] asks for them: a constant
+//!   velocity carries a vehicle that changes lanes beyond its new lane. With this model, both vehicles
+//!   keep their speeds along the road. A vehicle whose lane change is running keeps its lateral speed
+//!   until it is at the lateral position at which its lane change ends in the recording, and stays
+//!   there. All others keep their lateral positions. Boxes that do not move across the road point
+//!   along it. Results, horizon and condition are those of TTCE and DCE. The end of the lane change is
+//!   known only in hindsight, as its window and its new lane are. The published thresholds come
+//!   without a motion model. They judge the encounters at constant velocity, which need no further
+//!   assumption, so shares and figures refer to these.
 //! - **Shares** refer to the complete lane changes, unless [`Counted::All`] asks for all.
 //! - **Magnitudes**: published acceleration thresholds are signed, −8 m/s² for braking; here the
 //!   magnitude counts.
@@ -46,13 +55,14 @@
 
 mod evaluate;
 mod record;
+mod running;
 mod severity;
 mod shares;
 mod statistics;
 mod thresholds;
 
 pub use evaluate::{Judgement, criticality};
-pub use record::{CriticalLaneChange, Evaluation, FollowingMetrics, MetricResult, Metrics};
+pub use record::{CriticalLaneChange, CurvilinearMetrics, Evaluation, FollowingMetrics, MetricResult, Metrics};
 pub use severity::by_severity;
 pub use shares::{Counted, CriticalShare, CriticalShares, shares};
 pub use statistics::spearman;

@@ -99,6 +99,25 @@ impl FollowingMetrics {
     }
 }
 
+/// The closest encounters of vehicles that stay in their lanes, or complete their lane changes
+/// ([`curvilinear_encounter`](closecall_traffic::metrics::curvilinear_encounter)). `critical` states
+/// how the thresholds of DCE and TTCE would judge them. The counts of critical metrics leave them
+/// out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CurvilinearMetrics {
+    /// Smallest distance at closest encounter along the lanes (m).
+    pub dce_curvilinear_m: MetricResult,
+    /// Smallest time to closest encounter along the lanes (s).
+    pub ttce_curvilinear_s: MetricResult,
+}
+
+impl CurvilinearMetrics {
+    /// Returns both metrics with their names, in a fixed order.
+    pub const fn named(&self) -> [(&'static str, MetricResult); 2] {
+        [("dce_curvilinear_m", self.dce_curvilinear_m), ("ttce_curvilinear_s", self.ttce_curvilinear_s)]
+    }
+}
+
 /// The values of all metrics over one window of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
@@ -108,12 +127,17 @@ pub struct Evaluation {
     /// The two further metrics.
     #[serde(flatten)]
     pub following: FollowingMetrics,
+    /// The encounters along the lanes, if they were asked for.
+    #[serde(flatten)]
+    pub curvilinear: Option<CurvilinearMetrics>,
 }
 
 impl Evaluation {
-    /// Returns all nine metrics with their names, in a fixed order.
+    /// Returns all nine metrics with their names, in a fixed order, and after them the two of the
+    /// encounters along the lanes, if they were asked for.
     pub fn named(self) -> impl Iterator<Item = (&'static str, MetricResult)> {
-        self.metrics.named().into_iter().chain(self.following.named())
+        let curvilinear = self.curvilinear.map(|metrics| metrics.named());
+        self.metrics.named().into_iter().chain(self.following.named()).chain(curvilinear.into_iter().flatten())
     }
 }
 
@@ -127,15 +151,19 @@ pub struct CriticalLaneChange {
     pub metrics: Metrics,
     /// Two further metrics over the whole lane change.
     pub following: FollowingMetrics,
+    /// The encounters along the lanes over the whole lane change, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curvilinear: Option<CurvilinearMetrics>,
     /// All metrics at the instant nearest to the crossing alone.
     pub at_crossing: Evaluation,
 }
 
 impl CriticalLaneChange {
     /// Returns the nine metrics over the whole lane change, each with its name and its value at the
-    /// crossing.
+    /// crossing, and after them the two of the encounters along the lanes, if they were asked for.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, MetricResult, MetricResult)> {
-        let whole = Evaluation { metrics: self.metrics, following: self.following };
+        let Self { metrics, following, curvilinear, .. } = *self;
+        let whole = Evaluation { metrics, following, curvilinear };
         whole.named().zip(self.at_crossing.named()).map(|((name, whole), (_, crossing))| (name, whole, crossing))
     }
 }

@@ -402,13 +402,6 @@ pub(super) struct CollectedSource {
 }
 
 impl CollectedSource {
-    /// Returns rows whose road and lanes the file states.
-    pub(super) fn of_rows(rows: Vec<Row>, info: FileInfo, notes: Vec<String>, unknown_classes: UnknownClasses) -> Self {
-        let items = rows.into_iter().map(Ok).collect();
-        let lane_sides = LaneSides::default();
-        Self { items, info, notes, is_in_doubt: false, is_mirrored: false, unknown_classes, lane_sides }
-    }
-
     /// Adds what vehicles beside each other show of the lanes.
     pub(super) fn with_lane_sides(self, lane_sides: LaneSides) -> Self {
         Self { lane_sides, ..self }

@@ -23,8 +23,8 @@ use std::io::BufRead;
 
 use closecall_traffic::{Lane, Time, VehicleClass, maths};
 
-use super::class_names::UnknownClasses;
-use super::collected::{Collected, CollectedRow, CollectedSource, Facts, Position, distinct_numbers};
+use super::class_names::{UnknownClass, UnknownClasses};
+use super::collected::{Collected, CollectedRow, Facts, Position, distinct_numbers};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, shown};
@@ -296,32 +296,60 @@ fn clock(text: &OpenLabelText) -> Clock {
 /// Returns the acceleration that a file states for a vehicle in a frame.
 fn acceleration_mps2(path: &str, row: &LabelledRow) -> Result<Option<f64>, ReadError> {
     let checked = |mps2| checked(path, names::ACCELERATION, mps2, allowed::ACCELERATION_MPS2);
-    row.acceleration_mps2.map(checked).transpose()
+    row.acceleration_mps2.get().map(checked).transpose()
+}
+
+/// The rows of a file that states positions and lanes on the road. Each is checked when it is asked
+/// for, so that the file is held once.
+struct RoadRows {
+    /// The file without its rows.
+    text: OpenLabelText,
+    rows: std::vec::IntoIter<LabelledRow>,
+    /// Numbers of the tracks, by the index of the object.
+    numbers: Vec<u64>,
+    classes: Vec<VehicleClass>,
+    /// Time between two frames (s), if a frame rate is stated.
+    period_s: Option<f64>,
+    clock: Clock,
+    info: FileInfo,
+    notes: Vec<String>,
+    unknown_classes: UnknownClasses,
 }
 
 /// Returns the rows of a file that states positions and lanes on the road.
-fn on_road(mut text: OpenLabelText) -> Result<CollectedSource, ReadError> {
+fn on_road(mut text: OpenLabelText) -> Result<RoadRows, ReadError> {
     let mut rows = std::mem::take(&mut text.rows);
     rows.sort_by_key(|row| (row.frame, row.object));
     let mut notes = Vec::new();
     let numbers = numbers(&text, &mut notes);
     let mut unknown_classes = UnknownClasses::default();
     let classes = classes(&text, &mut unknown_classes);
-    let times = Times::new(&text)?;
+    let period_s = Times::new(&text)?.period_s;
+    let info = FileInfo {
+        layout: Layout::OpenLabel,
+        name: text.metadata.as_ref().and_then(|metadata| metadata.name.clone()),
+        period: period_s.map(Time::from_s),
+        markings: markings(&text.right_edges_m)?,
+    };
     let clock = clock(&text);
-    let row = |row: LabelledRow| {
-        let path = path_of(&text, &row);
-        let (object, number) = (&text.objects[row.object as usize], numbers[row.object as usize]);
+    Ok(RoadRows { text, rows: rows.into_iter(), numbers, classes, period_s, clock, info, notes, unknown_classes })
+}
+
+impl RoadRows {
+    /// Checks what a frame says of a vehicle.
+    fn row(&self, row: &LabelledRow) -> Result<Row, ReadError> {
+        let path = path_of(&self.text, row);
+        let (object, number) = (&self.text.objects[row.object as usize], self.numbers[row.object as usize]);
         let need = |name: &str, value: Option<f64>| {
             value.ok_or_else(|| {
                 refused(format!("`{path}.num` has no `{name}`, which cuboids in `{}` need", names::ROAD))
             })
         };
-        let speed_mps = checked(&path, names::SPEED, need(names::SPEED, row.speed_mps)?, SPEED_MPS)?;
-        let lane = lane_number(&path, need(names::LANE, row.lane)?)?;
-        let time = match row.time_s {
+        let speed_mps = checked(&path, names::SPEED, need(names::SPEED, row.speed_mps.get())?, SPEED_MPS)?;
+        let lane = lane_number(&path, need(names::LANE, row.lane.get())?)?;
+        let time = match row.time_s.get() {
             Some(time_s) => Time::from_s(checked(&path, names::TIME, time_s, EPOCH_S)?),
-            None => times.at(row.frame)?,
+            None => Times { timestamps: &self.text.timestamps, period_s: self.period_s }.at(row.frame)?,
         };
         let in_object = || format!("openlabel.objects.{}.object_data", object.uid);
         let stated =
@@ -333,27 +361,37 @@ fn on_road(mut text: OpenLabelText) -> Result<CollectedSource, ReadError> {
             vehicle_id,
             frame: row.frame,
             time,
-            clock,
+            clock: self.clock,
             s_m: checked(&path, "x of the cuboid", row.x_m, allowed::POSITION_M)?,
             d_m: checked(&path, "y of the cuboid", row.y_m, LATERAL_M)?,
             lane,
             speed_mps,
-            acceleration_mps2: acceleration_mps2(&path, &row)?,
+            acceleration_mps2: acceleration_mps2(&path, row)?,
             length_m: checked(&path, "the length of the cuboid", row.length_m, allowed::LENGTH_M)?,
             width_m: checked(&path, "the width of the cuboid", row.width_m, allowed::WIDTH_M)?,
-            class: classes[row.object as usize],
+            class: self.classes[row.object as usize],
             marking_distances: MarkingDistances::default(),
             line: row.line,
         })
-    };
-    let rows: Vec<Row> = rows.into_iter().map(row).collect::<Result<_, ReadError>>()?;
-    let info = FileInfo {
-        layout: Layout::OpenLabel,
-        name: text.metadata.as_ref().and_then(|metadata| metadata.name.clone()),
-        period: times.period_s.map(Time::from_s),
-        markings: markings(&text.right_edges_m)?,
-    };
-    Ok(CollectedSource::of_rows(rows, info, notes, unknown_classes))
+    }
+}
+
+impl RowSource for RoadRows {
+    fn info(&self) -> FileInfo {
+        self.info.clone()
+    }
+
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
+        self.rows.next().map(|row| self.row(&row)).transpose()
+    }
 }
 
 /// Lateral positions of several roads beside each other, 1 km apart (m).
@@ -393,7 +431,7 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
                     (to.x_m - from.x_m) * maths::cos(heading_rad) + (to.y_m - from.y_m) * maths::sin(heading_rad);
                 if span_s > 0.0 { along_m / span_s } else { 0.0 }
             };
-            let speed_mps = row.speed_mps.unwrap_or_else(derived);
+            let speed_mps = row.speed_mps.get().unwrap_or_else(derived);
             let vehicle = collected.vehicle(&text.objects[row.object as usize].uid);
             collected.push(Ok(CollectedRow {
                 vehicle,
@@ -416,4 +454,54 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
         notes: Vec::new(),
         unknown_classes,
     })?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with one car in two frames, of which the second has these numbers.
+    fn file(second: &str) -> String {
+        let road = names::ROAD;
+        let frame = |time_s: f64, s_m: f64, numbers: &str| {
+            format!(
+                r#"{{"frame_properties": {{"timestamp": {time_s}}}, "objects": {{"7": {{"object_data": {{
+                "cuboid": [{{"coordinate_system": "{road}", "val": [{s_m}, -1.75, 0, 0, 0, 0, 4.5, 1.8, 1.5]}}],
+                "num": [{numbers}]}}}}}}}}"#
+            )
+        };
+        let speed = format!(r#"{{"name": "{}", "val": 30}}"#, names::SPEED);
+        let first = format!(r#"{speed}, {{"name": "{}", "val": 1}}"#, names::LANE);
+        format!(
+            r#"{{"openlabel": {{"metadata": {{"schema_version": "{}"}}, "objects": {{"7": {{"type": "car"}}}},
+            "frames": {{"0": {}, "1": {}}}}}}}"#,
+            names::SCHEMA_VERSION,
+            frame(0.0, 100.0, &first),
+            frame(0.1, 103.0, &format!("{speed}{second}"))
+        )
+    }
+
+    #[test]
+    fn rows_on_the_road_are_checked_when_they_are_asked_for() {
+        let lane = format!(r#", {{"name": "{}", "val": 1}}"#, names::LANE);
+        let text = file(&lane);
+        let mut rows = read(text.as_bytes(), LaneReliability::Reliable).unwrap();
+        let [first, second] = [(); 2].map(|()| rows.next_row().unwrap().unwrap());
+        assert_eq!((first.number, first.frame, first.s_m, first.lane), (7, 0, 100.0, 1));
+        assert_eq!((second.time, second.speed_mps, second.acceleration_mps2), (Time::from_ms(100), 30.0, None));
+        assert!(rows.next_row().unwrap().is_none());
+        let text = file("");
+        let mut rows = read(text.as_bytes(), LaneReliability::Reliable).unwrap();
+        assert!(rows.next_row().unwrap().is_some());
+        let error = rows.next_row().unwrap_err();
+        let message = error.problem.to_string();
+        assert!(message.contains("`openlabel.frames.1.objects.7.object_data.num` has no `lane`"), "{message}");
+        assert!(!error.affects_one_row());
+    }
+
+    #[test]
+    fn a_row_takes_no_more_memory_than_its_numbers() {
+        // Twelve numbers of 8 bytes: two of them for object, frame and coordinate system.
+        assert!(size_of::<LabelledRow>() <= 96, "{}", size_of::<LabelledRow>());
+    }
 }

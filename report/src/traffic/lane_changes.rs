@@ -83,6 +83,8 @@ impl fmt::Display for CriticalityText<'_> {
             words::counted(quality.jumps, "jump"),
             words::counted(quality.overlaps, "overlap"),
         )?;
+        // The names of the metrics along the lanes are longer than the others.
+        let width = if changes.iter().any(|change| change.curvilinear.is_some()) { 18 } else { 12 };
         for change in changes {
             writeln!(f, "{}", line(&change.lane_change))?;
             for (name, whole, crossing) in change.named() {
@@ -92,7 +94,7 @@ impl fmt::Display for CriticalityText<'_> {
                 let number =
                     |metric: MetricResult| metric.value().map_or("-".to_owned(), |value| format!("{value:.2}"));
                 let (whole, crossing) = (number(whole), number(crossing));
-                writeln!(f, "         {name:<12} {whole:>9}  at the crossing {crossing:>9}{mark}{doubt}")?;
+                writeln!(f, "         {name:<width$} {whole:>9}  at the crossing {crossing:>9}{mark}{doubt}")?;
             }
         }
         let shares = shares(changes, counted);
@@ -114,9 +116,9 @@ impl fmt::Display for CriticalityText<'_> {
                 0 => String::new(),
                 number => format!(", {number} of them implausible"),
             };
-            writeln!(f, "  {metric:<12} {critical:>4}  {percent:>6}  ({interval}{absent} absent{doubt})")?;
+            writeln!(f, "  {metric:<width$} {critical:>4}  {percent:>6}  ({interval}{absent} absent{doubt})")?;
         }
-        writeln!(f, "  {:<12} {:>4}", "any", shares.any)?;
+        writeln!(f, "  {:<width$} {:>4}", "any", shares.any)?;
         Ok(())
     }
 }

@@ -273,9 +273,12 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     stdout(&closecall(record), 0);
     let alone = at("alone.csv");
     alone_in(&few, first["track_id"].as_u64().unwrap(), &alone);
-    let (many, single) =
-        (program(&["traffic", "criticality", &csv], 0), program(&["traffic", "criticality", &alone], 0));
+    let (many, single) = (
+        program(&["traffic", "criticality", &csv, "--curvilinear"], 0),
+        program(&["traffic", "criticality", &alone, "--curvilinear"], 0),
+    );
     hold("criticality", each(&many).into_iter().chain(each(&single)));
+    hold("aerial", [&program(&["traffic", "aerial", &few, "--around-s", "2", "-o", &at("flown")], 0)]);
     hold("reenact", [&program(&["traffic", "reenact", &csv], 0)]);
     let sampled =
         program(&["traffic", "sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
