@@ -153,7 +153,7 @@ fn each_fault_raises_its_alarm_and_only_the_sensor_that_has_it_does() {
         ("height-m = -0.05", Alarm::WrongHeight),
         ("pitch-deg = -0.5", Alarm::WrongHeight),
         ("range-noise-m = 0.3", Alarm::NoisyRanges),
-        ("lost-frames = 0.4", Alarm::LostScans),
+        ("lost-frames = 0.6", Alarm::LostScans),
         ("delay-s = 0.2", Alarm::LateScans),
         ("jitter-s = 0.2", Alarm::LateScans),
         ("clock-offset-s = -0.05", Alarm::LateScans),
