@@ -16,6 +16,7 @@ use crate::faults::{FaultList, LidarFault};
 use crate::half_turn::{HalfTurn, turn_back};
 use crate::lidar::Lidar;
 use crate::lidar_chain::{LidarChain, Seen};
+use crate::monitors::Alarms;
 use crate::object::NoiseKey;
 use crate::perception::{MountedLidar, UsedBox};
 use crate::{Alterations, Health, Scene, SceneVehicle, SensorError};
@@ -68,6 +69,11 @@ impl FrontLidar {
     /// Returns what the tracker has made of boxes in the latest step.
     pub(crate) fn used_boxes(&self) -> impl Iterator<Item = UsedBox> {
         self.chain.used_boxes()
+    }
+
+    /// Returns what the monitors of the sensor have noticed.
+    pub(crate) fn alarms(&self) -> Alarms {
+        self.chain.alarms()
     }
 
     /// Returns the health of the sensor.

@@ -14,11 +14,12 @@ use crate::front_lidar::FrontLidar;
 use crate::lidar::Lidar;
 use crate::lidar_chain::MAX_ADDITIONAL_LIDARS;
 use crate::lidar_chain::{LidarChain, Seen};
+use crate::monitors::{Alarm, Alarms};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
 use crate::radar::{MountedRadars, RearRadar, RearRadars};
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::{Alterations, Health, Perception, RearImage, Scene, SensorError, SensorHealth};
+use crate::{Alterations, Health, Perception, RearImage, Scene, SensorAlarms, SensorError, SensorHealth};
 
 /// The sensor and tracker models of the full chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,6 +188,15 @@ impl Perception for FullPerception {
     fn health(&self) -> SensorHealth {
         let front = self.front_lidar.as_ref().map_or_else(|| self.front.health(), FrontLidar::health);
         SensorHealth { front, surround: self.surround.health(), rear: self.rear_health() }
+    }
+
+    fn alarms(&self) -> SensorAlarms {
+        let front = self.front_lidar.as_ref().map_or_else(|| self.front.alarms(), FrontLidar::alarms);
+        let lidars = self.rear.as_ref().map_or(Alarms::NONE, LidarChain::alarms);
+        // The monitor of the camera notices only that nothing new arrives.
+        let camera = self.classifier.as_ref().map_or(Health::Ok, |classifier| classifier.health());
+        let rear = lidars.with_if(Alarm::NothingNew, camera == Health::Failed);
+        SensorAlarms { front, surround: self.surround.alarms(), rear }
     }
 
     fn lidars(&self) -> Vec<MountedLidar<'_>> {

@@ -6,6 +6,7 @@
 //!  Scene ────┤ camera/  image crop at each cluster ─▶ classifier ─▶ class scores                ├─▶ tracking/ ─▶ tracks
 //!            ├ radar/   range, angle, radial speed of each vehicle behind ─────────────────────────▶ speed of tracks
 //!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
+//!  monitors/   what a sensor delivers ─▶ alarms, health
 //! ```
 
 mod alterations;
@@ -27,6 +28,7 @@ mod image_evidence;
 mod kept;
 pub mod lidar;
 mod lidar_chain;
+pub mod monitors;
 mod object;
 mod perception;
 mod radar;
@@ -56,7 +58,7 @@ pub use object::{
     ByClass, Chain, ErrorGrid, ErrorGrids, FitError, FittedErrors, NamedGrid, NoiseKey, ObjectPerception,
     ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
 };
-pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorHealth, UsedBox};
+pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorAlarms, SensorHealth, UsedBox};
 pub use radar::{MountedRadars, RadarReturn, RadarSource, RearRadar, RearRadarConfig};
 pub use recorded::{RecordedPerception, RecordedScanError};
 pub use worker_classifier::{inference_backend, set_inference_backend};

@@ -28,6 +28,7 @@ use crate::faults::{FaultList, LidarFault, RadarFault};
 
 use crate::detection_classifier::DetectionClassifier;
 use crate::lidar::{Lidar, LidarScan, RESERVED_CLUSTERS};
+use crate::monitors::Alarms;
 use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
 use crate::radar::{MountedRadars, RearRadars};
@@ -35,6 +36,7 @@ use crate::surroundings::OtherVehicle;
 use crate::{Alterations, Detection, Health, Scene, SensorError};
 
 mod health;
+mod road_watch;
 mod sensor;
 
 use sensor::{ChainSensor, NewScan};
@@ -286,6 +288,7 @@ impl LidarChain {
                 match next.filter(|scan| scan.time == time) {
                     Some(scan) => {
                         scan.is_processed = true;
+                        sensor.transport.observe(scan.arrival());
                         numbers[number] = scan.number;
                         let range_m = if scan.is_missing { 0.0 } else { view.range_m };
                         *due = Some(TrackerScan {
@@ -349,6 +352,12 @@ impl LidarChain {
     /// Returns the radars with their latest scan, if there are any.
     pub(crate) fn rear_radars(&self) -> Option<MountedRadars<'_>> {
         self.radars.as_ref().map(RearRadars::mounted)
+    }
+
+    /// Returns what the monitors of all sensors have noticed.
+    pub(crate) fn alarms(&self) -> Alarms {
+        let radars = self.radars.as_ref().map_or(Alarms::NONE, RearRadars::alarms);
+        self.sensors.iter().fold(radars, |all, sensor| all.and(sensor.alarms))
     }
 
     /// Returns the health of the sensors together. Without a radar the chain works, less well.

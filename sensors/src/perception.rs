@@ -6,6 +6,7 @@ use closecall_traffic::{Time, Track};
 
 use crate::error::SensorError;
 use crate::lidar::RearLidar;
+use crate::monitors::Alarms;
 use crate::radar::MountedRadars;
 use crate::{Detection, Scene};
 
@@ -30,6 +31,17 @@ pub struct SensorHealth {
     pub surround: Health,
     /// The sensors that look back: LiDAR and camera, or the object-level sensor in their place.
     pub rear: Health,
+}
+
+/// What the monitors of each group of the ego's sensors have noticed: the reasons of their health.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SensorAlarms {
+    /// The radar or the LiDAR that looks ahead.
+    pub front: Alarms,
+    /// The short-range sensors to both sides.
+    pub surround: Alarms,
+    /// The sensors that look back.
+    pub rear: Alarms,
 }
 
 /// The horizontal field of view of a rear sensor: a wedge whose apex is the sensor's position.
@@ -128,6 +140,12 @@ pub trait Perception: Send {
 
     /// Returns the health of the sensors after the latest step.
     fn health(&self) -> SensorHealth;
+
+    /// Returns what the monitors of the sensors have noticed by the latest step. A group without an
+    /// alarm is healthy.
+    fn alarms(&self) -> SensorAlarms {
+        SensorAlarms::default()
+    }
 
     /// Returns the LiDARs with their latest points and boxes: the LiDAR that looks ahead, then the
     /// LiDARs that look back in the order of the scenario. Returns none if none are simulated.

@@ -13,10 +13,10 @@
 //! notice: a sensor that delivers nothing ([`Health::Failed`](crate::Health::Failed) after
 //! [`NOTICED_AFTER_SCANS`] scans), or the same bits again and again. A sensor whose dirt leaves
 //! less than half of its range reports [`Health::Degraded`](crate::Health::Degraded), as sensors
-//! with a blockage monitor do; so does a rear radar whose time stamps show that it is late. No
-//! function acts on that. Glare, dirt on the camera, a blocked
-//! sector, noise, wrong time stamps, a wrong mounting, and a wrong odometry or map remain
-//! unnoticed.
+//! with a blockage monitor do. So does one whose scans are lost or late, and a LiDAR that does not
+//! see the road as it should ([`monitors`](crate::monitors)). No function acts on that. Glare, dirt
+//! on the camera, false points and ghosts, a wrong yaw, a wrong odometry or map, and most faults of
+//! the measurements of object-level sensors remain unnoticed.
 //!
 //! The random numbers of faults come from streams of their own, and from the address of a beam in a
 //! scan. A scenario without faults draws none of them.

@@ -1,12 +1,13 @@
 //! The rear LiDAR as the simulation loop uses it: one call turns a scene into points, another turns
 //! points into boxes.
 
-use closecall_traffic::Stream;
+use closecall_traffic::{Environment, Stream};
 
 use super::{
     ClusteredPoints, Detector, LaneGeometry, Lidar, LidarScan, PointBeam, ScanTruth, Scanner, SegmentationReport,
 };
 use crate::faults::LidarFault;
+use crate::monitors::RoadBeam;
 use crate::{Detection, Scene, SensorError};
 
 /// The rear LiDAR: its scanner and its processing chain.
@@ -84,6 +85,12 @@ impl RearLidar {
     /// Returns true if the latest scan has no point, not even one of the road.
     pub fn is_dark(&mut self) -> bool {
         self.scanner.is_dark()
+    }
+
+    /// Writes the beams of these columns of the latest scan that see the road into `beams`, the same
+    /// number for each column: see [`Scanner::probe`].
+    pub(crate) fn look_at_road(&mut self, columns: &[usize], environment: &Environment, beams: &mut Vec<RoadBeam>) {
+        self.scanner.probe(columns, environment, beams);
     }
 
     /// Returns this LiDAR with the complete latest scan: with the points of the bare road, which

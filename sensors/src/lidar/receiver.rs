@@ -112,6 +112,16 @@ impl SensorPoseEstimate {
         [self.sin, self.cos]
     }
 
+    /// Returns the vector of the level road's plane in the sensor's frame (1/m), see
+    /// [`targets`](super::targets), as far as the ego knows it.
+    pub(crate) fn road_inverse(&self) -> [f32; 3] {
+        let up = match &self.turned {
+            None => [self.sin, 0.0, self.cos],
+            Some(axes) => axes.map(|[_, _, up]| up),
+        };
+        up.map(|component| -component / self.sensor_m[2])
+    }
+
     /// Turns a direction of a sensor that is not turned from its frame to the ego's frame at the
     /// end of the sweep.
     #[inline(always)]

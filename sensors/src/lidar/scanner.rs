@@ -80,7 +80,14 @@ pub struct Scanner {
     latest: Option<Sweep>,
     /// Number of false alarms in the latest scan.
     false_alarms: usize,
+    /// The returns of the beams that a monitor looks at, in the latest scan.
+    probed: (LidarScan, ScanTruth),
+    /// The layers that it looks at; none before the first scan that sees the road.
+    road_layers: LayerMask,
 }
+
+/// Number of returns for which memory is reserved, of the beams that a monitor looks at.
+const PROBED_POINTS: usize = 64;
 
 /// Returns the vector registers of this processor in which a sweep is fastest. AVX-512 gains
 /// nothing over AVX2, since all lanes fit into AVX2 registers. It takes longer where it calls
@@ -116,6 +123,8 @@ impl Scanner {
             added: Vec::new(),
             latest: None,
             false_alarms: 0,
+            probed: (LidarScan::with_capacity(PROBED_POINTS), ScanTruth { points: Vec::with_capacity(PROBED_POINTS) }),
+            road_layers: 0,
         }
     }
 
@@ -370,5 +379,6 @@ impl Scanner {
 
 mod collect;
 mod points;
+mod probe;
 #[cfg(test)]
 mod tests;

@@ -8,10 +8,12 @@ use crate::tracking::RearView;
 use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleState, maths};
 
 use super::Seen;
+use super::road_watch::RoadWatch;
 use crate::alterations::give_true_boxes;
 use crate::external::OutsideScan;
 use crate::faults::{FaultList, LidarFault, NOTICED_AFTER_SCANS};
 use crate::lidar::{LaneGeometry, Lidar, LidarKind, LidarScan, RESERVED_CLUSTERS, RearLidar};
+use crate::monitors::{Alarm, Alarms, Arrival, TransportMonitor};
 use crate::object::{DEGRADED_SHARE, NoiseKey, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::{Detection, Health, Scene, SensorError};
@@ -35,6 +37,8 @@ pub(super) struct PendingScan {
     pub(super) is_processed: bool,
     /// Whether no scan has arrived: nothing could be detected.
     pub(super) is_missing: bool,
+    /// Time of arrival less the time stamp and the usual latency (s).
+    pub(super) lateness_s: f64,
 }
 
 /// A LiDAR with its faults.
@@ -57,6 +61,11 @@ pub(super) struct ChainSensor {
     /// Whether scans are lost and late, drawn with each scan if the LiDAR has faults.
     fault_rng: Stream,
     pub(super) health: Health,
+    /// What the monitors have noticed.
+    pub(super) alarms: Alarms,
+    /// The monitor of the scans that the tracker gets.
+    pub(super) transport: TransportMonitor,
+    road_watch: RoadWatch,
     rng: Stream,
     pub(super) pending: VecDeque<PendingScan>,
     /// Number of scans so far.
@@ -100,6 +109,9 @@ impl ChainSensor {
             faults: FaultList::default(),
             fault_rng: key.stream(channel[1]),
             health: Health::Ok,
+            alarms: Alarms::NONE,
+            transport: TransportMonitor::new(lidar.kind.period_s()),
+            road_watch: RoadWatch::new(lidar.kind),
             rng: key.stream(channel[0]),
             pending: VecDeque::with_capacity(RESERVED_SCANS),
             scans: 0,
@@ -156,7 +168,11 @@ impl ChainSensor {
         // comparing two scans.
         self.frozen_scans = if is_frozen { self.frozen_scans.saturating_add(1) } else { 0 };
         self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
-        self.health = self.judge_health(scene, fault.as_ref());
+        // A silent sensor shows the monitor nothing, and a frozen one nothing new.
+        if fault.is_none_or(|fault| !fault.is_dead && !fault.is_frozen) {
+            self.road_watch.look(&mut self.lidar, seen.environment);
+        }
+        (self.alarms, self.health) = self.judge_health(scene, fault.as_ref());
         while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {
             self.spare.push(scan.detections);
         }
@@ -191,6 +207,7 @@ impl ChainSensor {
             due_step,
             is_processed: false,
             is_missing: false,
+            lateness_s: 0.0,
         });
         self.scans += 1;
         Ok(())
@@ -207,11 +224,15 @@ impl ChainSensor {
 
     /// Keeps the memory of a scan that the tracker does not get.
     pub(super) fn recycle(&mut self, scan: NewScan) {
+        let lateness_s = scan.late_steps as f64 * CONTROL_STEP.s() - scan.clock_offset().s();
+        self.transport.observe(Arrival { is_lost: scan.is_missing(), lateness_s });
         self.spare.push(scan.detections);
     }
 
     /// Appends a scan to the queue. The tracker may have it from `step` on, if it is not late.
     pub(super) fn push(&mut self, new: NewScan, step: u64, Seen { scene, believed, .. }: &Seen<'_>) {
+        // Scans arrive in their order.
+        let due_step = (step + new.late_steps).max(self.pending.back().map_or(0, |scan| scan.due_step));
         let mut scan = PendingScan {
             number: self.scans,
             time: scene.time,
@@ -219,9 +240,9 @@ impl ChainSensor {
             ego: believed.ego.state,
             is_missing: new.is_missing(),
             detections: new.detections,
-            // Scans arrive in their order.
-            due_step: (step + new.late_steps).max(self.pending.back().map_or(0, |scan| scan.due_step)),
+            due_step,
             is_processed: false,
+            lateness_s: due_step.saturating_sub(step) as f64 * CONTROL_STEP.s(),
         };
         if let Some(offset_s) = new.fault.map(|fault| fault.clock_offset_s).filter(|offset_s| *offset_s != 0.0) {
             scan.misdate(offset_s);
@@ -230,20 +251,28 @@ impl ChainSensor {
         self.scans += 1;
     }
 
-    /// Returns the LiDAR's health: failed if no point has returned for a while, or if the same
-    /// points return again and again; degraded if weather or dirt cost more than half of the range.
-    fn judge_health(&self, scene: &Scene<'_>, fault: Option<&LidarFault>) -> Health {
+    /// Returns what the monitors have noticed, and the LiDAR's health: failed if no point has
+    /// returned for a while, or if the same points return again and again; degraded if weather or
+    /// dirt cost more than half of the range, or if another monitor has noticed something.
+    fn judge_health(&self, scene: &Scene<'_>, fault: Option<&LidarFault>) -> (Alarms, Health) {
         let degraded_below_m = DEGRADED_SHARE * self.model.nominal_range_m;
         let clear_range_m = fault.map_or(self.clear_range_m, |fault| self.clear_range_m * fault.window_transmission);
-        if self.empty_scans.max(self.frozen_scans) >= self.noticed_after_scans {
-            Health::Failed
-        } else if clear_range_m < degraded_below_m
-            || range_in_weather_m(clear_range_m, scene.environment) < degraded_below_m
-        {
-            Health::Degraded
-        } else {
-            Health::Ok
-        }
+        let is_short =
+            clear_range_m < degraded_below_m || range_in_weather_m(clear_range_m, scene.environment) < degraded_below_m;
+        let has_failed = self.empty_scans.max(self.frozen_scans) >= self.noticed_after_scans;
+        let alarms = self
+            .road_watch
+            .alarms()
+            .with_if(Alarm::NothingNew, has_failed)
+            .with_if(Alarm::ShortRange, is_short)
+            .with_if(Alarm::LostScans, self.transport.loses_scans())
+            .with_if(Alarm::LateScans, self.transport.is_late());
+        let health = match (has_failed, alarms.is_empty()) {
+            (true, _) => Health::Failed,
+            (false, false) => Health::Degraded,
+            (false, true) => Health::Ok,
+        };
+        (alarms, health)
     }
 
     /// Returns the boxes of the latest scan.
@@ -290,11 +319,17 @@ fn offset(offset_s: f64) -> Time {
 }
 
 impl PendingScan {
+    /// Returns what the ego sees of the transport of the scan.
+    pub(super) fn arrival(&self) -> Arrival {
+        Arrival { is_lost: self.is_missing, lateness_s: self.lateness_s }
+    }
+
     /// Dates the scan `offset_s` later than it was measured: the ego then takes itself to have
     /// measured it from where it was at that time.
     fn misdate(&mut self, offset_s: f64) {
         let offset = offset(offset_s);
         self.time += offset;
+        self.lateness_s -= offset_s;
         self.ego.s_m += self.ego.speed_mps * maths::cos(self.ego.heading_rad) * offset_s;
         self.ego.d_m += self.ego.speed_mps * maths::sin(self.ego.heading_rad) * offset_s;
         self.detections.iter_mut().for_each(|detection| detection.time += offset);

@@ -15,6 +15,7 @@ use super::sector::Blocked;
 use super::sensor::ScanInput;
 use super::visibility::{Direction, NEEDED_SHARE};
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, ObjectFault};
+use crate::monitors::{Arrival, TransportMonitor};
 use crate::surroundings::OtherVehicle;
 
 /// Length and width of a vehicle that does not exist (m): a usual car.
@@ -55,6 +56,7 @@ pub(super) struct Faulty {
     /// Age of the newest scan that has arrived (steps).
     age_steps: usize,
     blocked: Blocked,
+    transport: TransportMonitor,
     /// Number of latest successive steps in which the sensor delivered nothing, or the same tracks
     /// again.
     failed_steps: u32,
@@ -93,6 +95,18 @@ impl Faulty {
         let more_steps = (more_s / CONTROL_STEP.s()).round() as usize;
         self.age_steps = self.arrivals.observe(step, latency_steps + more_steps);
         self.blocked.set(&self.fault.blocked_deg, direction);
+        if self.age_steps <= step {
+            // The scan of this age arrives in this step.
+            let late_s = (self.age_steps as f64 - latency_steps as f64) * CONTROL_STEP.s();
+            let lateness_s = late_s - self.fault.clock_offset_s;
+            let is_lost = self.is_frame_lost || self.fault.is_dead;
+            self.transport.observe(Arrival { is_lost, lateness_s });
+        }
+    }
+
+    /// Returns the monitor of the arrivals of the scans.
+    pub(super) fn transport(&self) -> &TransportMonitor {
+        &self.transport
     }
 
     /// Returns the share of the range that is left.

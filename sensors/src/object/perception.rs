@@ -6,7 +6,7 @@ use crate::faults::{Belief, Faults};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::TrackList;
-use crate::{Perception, Scene, SensorError, SensorHealth};
+use crate::{Perception, Scene, SensorAlarms, SensorError, SensorHealth};
 use closecall_traffic::Track;
 
 /// Perception by object-level sensors only.
@@ -64,6 +64,11 @@ impl Perception for ObjectPerception {
     fn health(&self) -> SensorHealth {
         let [front, surround, rear] = &self.sensors;
         SensorHealth { front: front.health(), surround: surround.health(), rear: rear.health() }
+    }
+
+    fn alarms(&self) -> SensorAlarms {
+        let [front, surround, rear] = &self.sensors;
+        SensorAlarms { front: front.alarms(), surround: surround.alarms(), rear: rear.alarms() }
     }
 
     fn rear_fields(&self) -> Vec<FieldOfView> {

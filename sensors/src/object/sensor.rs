@@ -21,6 +21,7 @@ use super::target::{Filters, Report, Target};
 use super::visibility::{Direction, Field, Visibility};
 use crate::alterations::BACKGROUND;
 use crate::faults::{FaultList, ObjectFault};
+use crate::monitors::{Alarm, Alarms};
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
 use crate::tracking::Gaussian;
@@ -208,15 +209,25 @@ impl ObjectSensor {
         list.tracks.extend(track);
     }
 
+    /// Returns what the monitors of the sensor have noticed.
+    pub(crate) fn alarms(&self) -> Alarms {
+        let range_m = self.ranges.usual_m() * self.faulty.range_share();
+        Alarms::NONE
+            .with_if(Alarm::NothingNew, self.faulty.is_noticed())
+            .with_if(Alarm::ShortRange, range_m < DEGRADED_SHARE * self.model.range_m)
+            .with_if(Alarm::LostScans, self.faulty.transport().loses_scans())
+            .with_if(Alarm::LateScans, self.faulty.transport().is_late())
+    }
+
     /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a
-    /// while; degraded if weather and dirt cost more than half of the range.
+    /// while; degraded if weather and dirt cost more than half of the range, or if scans are lost or
+    /// late.
     pub(crate) fn health(&self) -> Health {
-        if self.faulty.is_noticed() {
-            Health::Failed
-        } else if self.ranges.usual_m() * self.faulty.range_share() < DEGRADED_SHARE * self.model.range_m {
-            Health::Degraded
-        } else {
-            Health::Ok
+        let alarms = self.alarms();
+        match (alarms.contains(Alarm::NothingNew), alarms.is_empty()) {
+            (true, _) => Health::Failed,
+            (false, false) => Health::Degraded,
+            (false, true) => Health::Ok,
         }
     }
 

@@ -17,6 +17,7 @@ use super::output::{MountedRadars, RadarReturn, RadarSource};
 use super::rain::range_in_rain_m;
 use crate::external::OutsideRadarScan;
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS, RadarFault};
+use crate::monitors::{Alarm, Alarms};
 use crate::object::DEGRADED_SHARE;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::{RadarDetection, RadarScan};
@@ -147,14 +148,25 @@ impl RearRadars {
     /// while. It is degraded if one of them has, if the time stamps have shown for a while that a
     /// radar is late, or if dirt and rain cost a radar more than half of its range.
     pub(crate) fn health(&self) -> Health {
-        let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
-        let is_noticed = |scans: u32| f64::from(scans) * self.model.period_s() >= noticed_s;
-        let are_late = self.late_scans.map(is_noticed);
-        match self.dead_scans.map(is_noticed) {
+        let are_late = self.late_scans.map(|scans| self.is_noticed(scans));
+        match self.dead_scans.map(|scans| self.is_noticed(scans)) {
             [true, true] => Health::Failed,
             [false, false] if !(are_late.contains(&true) || self.are_short.contains(&true)) => Health::Ok,
             _ => Health::Degraded,
         }
+    }
+
+    /// Returns what the monitors of the two radars have noticed.
+    pub(crate) fn alarms(&self) -> Alarms {
+        Alarms::NONE
+            .with_if(Alarm::NothingNew, self.dead_scans.iter().any(|scans| self.is_noticed(*scans)))
+            .with_if(Alarm::ShortRange, self.are_short.contains(&true))
+            .with_if(Alarm::LateScans, self.late_scans.iter().any(|scans| self.is_noticed(*scans)))
+    }
+
+    /// Returns whether so many successive scans have taken long enough for the ego to notice.
+    fn is_noticed(&self, scans: u32) -> bool {
+        f64::from(scans) * self.model.period_s() >= f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s()
     }
 
     /// Returns the radars with their latest scan.

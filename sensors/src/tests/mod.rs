@@ -4,6 +4,7 @@
 mod fixed_gap;
 mod front;
 mod long_vehicles;
+mod monitors;
 mod rear_radar;
 mod several_lidars;
 mod silhouettes;

@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod effects;
+mod noticed;
 mod watch;
 
 use std::collections::BTreeSet;
@@ -107,6 +108,36 @@ fn the_table_has_every_scenario_of_the_folder_once() {
     let listed: BTreeSet<String> = TABLE.iter().map(|(name, ..)| (*name).to_owned()).collect();
     assert_eq!(names, listed);
     assert_eq!(listed.len(), TABLE.len());
+}
+
+#[test]
+fn each_fault_is_noticed_in_time_with_its_reason_or_listed_as_one_that_no_monitor_notices() {
+    let mut wrong = Vec::new();
+    let mut kinds = BTreeSet::new();
+    for (name, sensor, _) in &TABLE {
+        match noticed::check(name, *sensor) {
+            Ok(true) => _ = kinds.insert(noticed::kind(name)),
+            Ok(false) => {}
+            Err(difference) => wrong.push(format!("{name}: {difference}")),
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let expected = [
+        "blocked",
+        "clock-offset",
+        "dead",
+        "dirty",
+        "dropout",
+        "frozen",
+        "height",
+        "jitter",
+        "late",
+        "lost-frames",
+        "misaligned",
+        "noisy",
+        "pitch",
+    ];
+    assert_eq!(kinds.into_iter().collect::<Vec<_>>(), expected);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use closecall_scenarios::{Scenario, ScenarioFile, library};
 use closecall_sensors::faults::Faults;
 use closecall_sensors::lidar::PointSource;
+use closecall_sensors::monitors::Alarms;
 use closecall_sensors::{Health, NoiseKey, Scene, SceneVehicle, Sensors};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Environment, Road, Source, Track, TrackStatus, Vehicle, VehicleClass, VehicleState,
@@ -55,6 +56,8 @@ pub(crate) struct Step {
     /// The tracks of the sensor that a function may act on.
     pub(crate) tracks: Vec<Track>,
     pub(crate) health: Health,
+    /// What the monitors of the sensor have noticed.
+    pub(crate) alarms: Alarms,
     /// Heights of the points on vehicles (m).
     pub(crate) points_z_m: Vec<f32>,
     /// Number of points where nothing is.
@@ -100,11 +103,11 @@ pub(crate) fn drive(sensor: Of, sensors: &Sensors, scenario: &Scenario, (car, st
         let scene = Scene { time: CONTROL_STEP * step, road, environment: &environment, ego, others: &others };
         let is_own = |track: &&Track| track.source == sensor.source() && track.status != TrackStatus::Tentative;
         let tracks = perception.step(&scene).unwrap().iter().filter(is_own).cloned().collect();
-        let health = perception.health();
-        let health = match sensor.source() {
-            Source::Front => health.front,
-            Source::Surround => health.surround,
-            Source::Rear => health.rear,
+        let (health, alarms) = (perception.health(), perception.alarms());
+        let (health, alarms) = match sensor.source() {
+            Source::Front => (health.front, alarms.front),
+            Source::Surround => (health.surround, alarms.surround),
+            Source::Rear => (health.rear, alarms.rear),
         };
         let (mut points_z_m, mut false_points) = (Vec::new(), 0);
         for mounted in perception.lidars().iter().filter(|mounted| mounted.looks_ahead == sensor.looks_ahead()) {
@@ -117,7 +120,7 @@ pub(crate) fn drive(sensor: Of, sensors: &Sensors, scenario: &Scenario, (car, st
                 }
             }
         }
-        shown.push(Step { tracks, health, points_z_m, false_points });
+        shown.push(Step { tracks, health, alarms, points_z_m, false_points });
         for vehicle in others.iter_mut().chain([&mut ego]) {
             vehicle.state.s_m += vehicle.state.speed_mps * CONTROL_STEP.s();
         }

@@ -5,7 +5,9 @@ use std::ops::Range;
 use closecall_controllers::EgoCommand;
 use closecall_sensors::camera::Camera;
 use closecall_sensors::faults::StatedFault;
-use closecall_sensors::{FieldOfView, Health, NoiseKey, RadarReturn, RearImage, Scene, SceneVehicle, SensorHealth};
+use closecall_sensors::{
+    FieldOfView, Health, NoiseKey, RadarReturn, RearImage, Scene, SceneVehicle, SensorAlarms, SensorHealth,
+};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState, maths};
@@ -95,6 +97,8 @@ pub struct Frame {
     pub(in crate::run) phase: Option<Phase>,
     /// Health of the sensors as the ego knows it; `None` for recorded traffic.
     pub(in crate::run) health: Option<SensorHealth>,
+    /// What the monitors of the sensors have noticed; nothing for recorded traffic.
+    pub(in crate::run) alarms: SensorAlarms,
     /// Fields of view of the rear sensors; none if they are not simulated or below
     /// [`Level::Objects`].
     pub(in crate::run) rear_fields: Vec<FieldOfView>,

@@ -217,6 +217,7 @@ impl Observer for FilmRecorder {
             command: Some(*view.command),
             phase: Some(view.phase),
             health: Some(view.perception.health()),
+            alarms: view.perception.alarms(),
             rear_fields: if keeps_objects { view.perception.rear_fields() } else { Vec::new() },
             scan,
             other_scans,

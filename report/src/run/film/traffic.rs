@@ -21,6 +21,7 @@ use closecall_traffic::{
 use super::{Film, FilmActor, Frame, Level, Part};
 use crate::units::labelled;
 use closecall_scenarios::causal::VehicleLetters;
+use closecall_sensors::SensorAlarms;
 use closecall_simulation::{CurrentMargins, Lead};
 
 /// Time shown before the start and after the end of the lane change.
@@ -241,6 +242,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         command: None,
         phase: None,
         health: None,
+        alarms: SensorAlarms::default(),
         rear_fields: Vec::new(),
         other_scans: Vec::new(),
         radar_health: None,

@@ -14,6 +14,7 @@ use closecall_controllers::EgoState;
 use closecall_scenarios::outcome::{Phase, ReachedMoment};
 use closecall_sensors::Health;
 use closecall_sensors::faults::{SensorGroup, StatedFault};
+use closecall_sensors::monitors::Alarms;
 use closecall_traffic::Time;
 use rerun::{StateChange, StateConfiguration};
 
@@ -68,14 +69,43 @@ const HEALTHY: &str = "healthy";
 const DEGRADED: &str = "degraded";
 const FAILED: &str = "failed";
 
-/// A group of sensors: its row, its health in a frame, and the groups of the faults that concern it.
-type HealthRow = (&'static str, fn(&Frame) -> Option<Health>, &'static [SensorGroup]);
+/// A group of sensors.
+struct HealthRow {
+    /// Its row.
+    row: &'static str,
+    /// Its health in a frame.
+    health: fn(&Frame) -> Option<Health>,
+    /// What its monitors have noticed.
+    alarms: fn(&Frame) -> Alarms,
+    /// The groups of the faults that concern it.
+    groups: &'static [SensorGroup],
+}
 
 const HEALTH_ROWS: [HealthRow; 4] = [
-    ("5_rear_radars", |frame| frame.radar_health, &[SensorGroup::RearRadars]),
-    ("5_rear_sensors", |frame| frame.health.map(|health| health.rear), &[SensorGroup::Rear, SensorGroup::RearRadars]),
-    ("7_front_sensor", |frame| frame.health.map(|health| health.front), &[SensorGroup::Front]),
-    ("7_side_sensors", |frame| frame.health.map(|health| health.surround), &[SensorGroup::Surround]),
+    HealthRow {
+        row: "5_rear_radars",
+        health: |frame| frame.radar_health,
+        alarms: |_| Alarms::NONE,
+        groups: &[SensorGroup::RearRadars],
+    },
+    HealthRow {
+        row: "5_rear_sensors",
+        health: |frame| frame.health.map(|health| health.rear),
+        alarms: |frame| frame.alarms.rear,
+        groups: &[SensorGroup::Rear, SensorGroup::RearRadars],
+    },
+    HealthRow {
+        row: "7_front_sensor",
+        health: |frame| frame.health.map(|health| health.front),
+        alarms: |frame| frame.alarms.front,
+        groups: &[SensorGroup::Front],
+    },
+    HealthRow {
+        row: "7_side_sensors",
+        health: |frame| frame.health.map(|health| health.surround),
+        alarms: |frame| frame.alarms.surround,
+        groups: &[SensorGroup::Surround],
+    },
 ];
 
 const BRAKING: [Word<'static>; 2] =
@@ -192,14 +222,14 @@ impl Plots<'_> {
         )
     }
 
-    /// Writes a band for each group of sensors that exists: its health as the ego knows it, and injected faults
-    /// that the ego has not noticed. The arms of a pair have the same sensors, so the baseline
+    /// Writes a band for each group of sensors that exists: its health as the ego knows it, with the
+    /// reasons, and injected faults that the ego has not noticed. The arms of a pair have the same sensors, so the baseline
     /// writes none.
     fn health(&self) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
         }
-        for (row, health, groups) in HEALTH_ROWS {
+        for HealthRow { row, health, alarms, groups } in HEALTH_ROWS {
             if self.film.frames.iter().all(|frame| health(frame).is_none()) {
                 continue;
             }
@@ -208,9 +238,11 @@ impl Plots<'_> {
                 let held = self.film.faults.iter().filter(|fault| concerns(fault));
                 let effects: Vec<String> = held.map(|fault| format!("{} {}", fault.sensor, fault.effects)).collect();
                 let suffix = if effects.is_empty() { String::new() } else { format!(": {}", effects.join("; ")) };
+                let alarms = alarms(frame);
+                let reasons = if alarms.is_empty() { String::new() } else { format!(", as {alarms}") };
                 match health(frame) {
-                    Some(Health::Failed) => format!("{FAILED}{suffix}"),
-                    Some(Health::Degraded) => format!("{DEGRADED}{suffix}"),
+                    Some(Health::Failed) => format!("{FAILED}{reasons}{suffix}"),
+                    Some(Health::Degraded) => format!("{DEGRADED}{reasons}{suffix}"),
                     Some(Health::Ok) | None if effects.is_empty() => HEALTHY.to_owned(),
                     Some(Health::Ok) | None => format!("faulty, not noticed{suffix}"),
                 }

@@ -306,6 +306,24 @@ fn the_states_name_the_fault_of_a_radar_and_when_the_ego_notices_it() {
 }
 
 #[test]
+fn the_states_give_the_reason_for_which_a_sensor_is_degraded() {
+    let data = chunks(&[filmed_with("[[fault.rear-lidar]]\ndelay-s = 0.2\nfrom-s = 1.0\n")], StoreKind::Recording);
+    let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/5_rear_sensors/with_MIS");
+    let states: Vec<String> = rows.flat_map(|chunk| texts(chunk, "StateChange:state")).collect();
+    let states: Vec<&str> = states.iter().filter(|state| !state.is_empty()).map(String::as_str).collect();
+    let fault = "rear LiDAR late by 0.20 s";
+    let begins = [
+        "healthy".to_owned(),
+        format!("faulty, not noticed: {fault}"),
+        format!("degraded, as time stamps do not fit the times of arrival: {fault}"),
+    ];
+    assert_eq!(states.len(), 3, "{states:?}");
+    for (state, begin) in states.iter().zip(&begins) {
+        assert!(state.starts_with(begin.as_str()), "{states:?}");
+    }
+}
+
+#[test]
 fn all_timelines_span_the_run_and_the_opening_one_begins_with_the_critical_moment() {
     let films = [default_film()];
     let chunks = chunks(&films, StoreKind::Recording);
