@@ -44,6 +44,9 @@ fn advice(error: &CliError) -> Option<&'static str> {
         CliError::Saved(error) | CliError::Causes(CausesError::Saved(error)) => of_saved(error).or(Some(ALL_OPTIONS)),
         CliError::Report(ReportError::Folder(error)) => of_folder(error),
         CliError::Report(ReportError::Saved(error)) => of_saved(error),
+        CliError::Causes(CausesError::NoFailure { .. }) => {
+            Some("`closecall campaign … --design search` looks for a first case")
+        }
         CliError::Causes(CausesError::Foreign { .. }) => Some("--out FILE names the file"),
         CliError::Causes(CausesError::Map(MapError::OfGrid { parameter, .. })) => Some(match *parameter {
             "speed-mps" => "--speed-mps sets it",

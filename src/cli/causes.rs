@@ -90,7 +90,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall minimize closecall-results 17",
-    "closecall minimize closecall-results 17 --scenario low-thw-overtake --controller mis -o smallest.toml",
+    "closecall minimize closecall-results 17 --scenario low-thw-overtake --controller mis -o case.toml",
     "closecall minimize closecall-results --nearest --runs 1000 --format json",
 ]))]
 pub(super) struct MinimizeArgs {

@@ -86,10 +86,7 @@ pub enum CausesError {
         runs: u64,
     },
     /// No vehicle collides in any sample.
-    #[error(
-        "no sample of `{scenario}` fails with `{controller}`: no vehicle collides; `closecall campaign --design search` looks \
-         for a first case"
-    )]
+    #[error("no sample of `{scenario}` fails with `{controller}`: no vehicle collides")]
     NoFailure {
         /// The scenario.
         scenario: String,
