@@ -34,6 +34,7 @@ mod noise;
 mod parts;
 mod pattern;
 mod power;
+mod pulse;
 mod rail_returns;
 mod rear;
 mod receiver;
@@ -74,7 +75,7 @@ pub use pattern::Pattern;
 pub(crate) use power::extinction_per_m;
 pub use rear::RearLidar;
 pub use recorded::{PointError, PointFrame, PointTimes, RecordedPoints, ScanMotion};
-pub use scan::{LidarScan, MirrorSide, PointBeam, PointSource, PointTruth, ScanTruth};
+pub use scan::{LidarScan, MirrorSide, PointBeam, PointSource, PointTruth, ScanEchoes, ScanTruth};
 pub use scanner::Scanner;
 pub use segmentation::SegmentationReport;
 #[cfg(test)]
