@@ -73,6 +73,7 @@ pub(crate) use names::intern_name;
 pub(crate) use pattern::HALF_FIELD_DEG;
 pub use pattern::Pattern;
 pub(crate) use power::extinction_per_m;
+pub use pulse::echo_pulse_width_ns;
 pub use rear::RearLidar;
 pub use recorded::{PointError, PointFrame, PointTimes, RecordedPoints, ScanMotion};
 pub use scan::{LidarScan, MirrorSide, PointBeam, PointSource, PointTruth, ScanEchoes, ScanTruth};

@@ -25,9 +25,11 @@
 //! the conversion from received light to echo pulse width for the SCALA 2 by goniometer. Only the
 //! abstract of the paper could be read, so no constant here is theirs.
 
-use closecall_traffic::maths;
+use closecall_traffic::{Environment, maths};
 
+use super::Lidar;
 use super::echo::PULSE_M;
+use super::power::LinkBudget;
 
 /// Duration of the pulse at half of its peak (ns): an assumption, the duration behind
 /// [`PULSE_M`]. The published model of the SCALA 1 has 4.5 ns (openMSL,
@@ -50,6 +52,15 @@ pub(super) fn width_ns(power: f32, range_variance_m2: f32) -> f32 {
     let pulse_sd_ns = PULSE_NS / HALF_PEAK_SDS;
     let variance_ns2 = pulse_sd_ns * pulse_sd_ns + NS_PER_M * NS_PER_M * range_variance_m2;
     2.0 * (2.0 * maths::ln(power) * variance_ns2).sqrt()
+}
+
+/// Returns the echo pulse width (ns) that a LiDAR reports of a Lambertian surface of this
+/// reflectivity at this range (m), without noise: 0 for an echo below the detection threshold. The
+/// surface faces the sensor and fills the beam, in air that does not attenuate.
+#[expect(clippy::cast_possible_truncation, reason = "powers need no more than single precision")]
+pub fn echo_pulse_width_ns(lidar: &Lidar, reflectivity: f64, range_m: f64) -> f64 {
+    let gain_m2 = f64::from(LinkBudget::new(lidar, &Environment::CLEAR_DAY).gain_m2);
+    f64::from(width_ns((reflectivity * gain_m2 / (range_m * range_m)) as f32, 0.0))
 }
 
 #[cfg(test)]
@@ -80,6 +91,27 @@ mod tests {
         }
         assert!(width_ns(1.001, 0.0) > 0.0);
         assert!(width_ns(10.0, DROPLET_VARIANCE_M2) > 1.1 * width_ns(10.0, 0.0));
+    }
+
+    /// `docs/evidence/lidar.md` has these figures.
+    #[test]
+    fn the_widths_of_half_white_boards_fall_with_the_range_about_as_measured() {
+        let predicted_ns = [20.0, 15.0, 10.0].map(|range_m| echo_pulse_width_ns(&Lidar::default(), 0.5, range_m));
+        for (predicted_ns, stated_ns) in predicted_ns.into_iter().zip([12.89, 13.67, 14.70]) {
+            assert!((predicted_ns - stated_ns).abs() < 0.005, "{predicted_ns}");
+        }
+        // The Ibeo LUX 2010 in openMSL's profile: c·4.5 ns, a range cell of 0.03 m, and the part that
+        // depends on the power (m).
+        let measured_m = [0.45, 0.61, 0.65].map(|by_power_m| 0.299_792_458 * 4.5 + 0.03 + by_power_m);
+        for (predicted_ns, measured_m) in predicted_ns.into_iter().zip(measured_m) {
+            let shares = [predicted_ns / 12.888, measured_m / measured_m_at_20_m()];
+            assert!((shares[0] / shares[1] - 1.0).abs() < 0.035, "{shares:?}");
+        }
+        assert_eq!(echo_pulse_width_ns(&Lidar::default(), 0.5, 201.0), 0.0);
+    }
+
+    fn measured_m_at_20_m() -> f64 {
+        0.299_792_458 * 4.5 + 0.03 + 0.45
     }
 
     #[test]
