@@ -113,7 +113,7 @@ typedef struct {
     const float *x_m; /* in the frame of the ego at the end of the scan (m) */
     const float *y_m;
     const float *z_m;
-    const float *intensity;    /* received power times the square of the range */
+    const float *intensity;    /* received power times the square of the range, with the losses of the window */
     const uint16_t *beam;      /* column * layers + layer */
     const uint32_t *offset_ns; /* time of the measurement after start_ns (ns) */
 } closecall_scan;

@@ -187,7 +187,8 @@ def _input(message: Mapping[str, Any]) -> PerceptionInput:
 
 
 def _scan(message: Mapping[str, Any]) -> LidarScan:
-    codes = {"x_m": "f", "y_m": "f", "z_m": "f", "intensity": "f", "beam": "H", "offset_ns": "I"}
+    singles = ("x_m", "y_m", "z_m", "intensity", "echo_pulse_width_ns")
+    codes = {**dict.fromkeys(singles, "f"), "beam": "H", "offset_ns": "I"}
     arrays = {name: memoryview(base64.b64decode(message[name])).cast(cast(Any, code)) for name, code in codes.items()}
     return _known(LidarScan, {**message, **arrays})
 

@@ -173,8 +173,10 @@ class LidarScan:
     x_m: memoryview[float]
     y_m: memoryview[float]
     z_m: memoryview[float]
-    #: Received power times the square of the range (32-bit floats).
+    #: Received power times the square of the range, with the losses of the window (32-bit floats).
     intensity: memoryview[float]
+    #: Time for which the echo exceeds the detection threshold (ns, 32-bit floats).
+    echo_pulse_width_ns: memoryview[float]
     #: Column · layers + layer (16-bit numbers).
     beam: memoryview[int]
     #: Time of the measurement after ``start_ns`` (ns, 32-bit numbers).

@@ -11,6 +11,7 @@
 mod fit_object_sensors;
 mod fuzz_readers;
 mod make_trajectory_file;
+mod plot_echo_widths;
 mod plot_regimes;
 mod render_aerial;
 mod render_dataset;
@@ -49,6 +50,8 @@ enum Task {
     FuzzReaders(Words),
     /// Generates a synthetic trajectory file of any size
     MakeTrajectoryFile(Words),
+    /// Draws the predicted echo pulse widths of the LiDAR beside published ones
+    PlotEchoWidths(Words),
     /// Draws the regimes of the Wiedemann 99 model
     PlotRegimes(Words),
     /// Renders labelled pictures of the aerial camera
@@ -104,6 +107,7 @@ fn main() -> ExitCode {
         Task::FitObjectSensors(args) => fit_object_sensors::main(args).report(),
         Task::FuzzReaders(Words { words }) => fuzz_readers::main(words).report(),
         Task::MakeTrajectoryFile(Words { words }) => make_trajectory_file::main(words).report(),
+        Task::PlotEchoWidths(Words { words }) => plot_echo_widths::main(words).report(),
         Task::PlotRegimes(Words { words }) => plot_regimes::main(words).report(),
         Task::RenderAerial(Words { words }) => render_aerial::main(words).report(),
         Task::RenderDataset(Words { words }) => render_dataset::main(words).report(),

@@ -66,7 +66,7 @@ fn stretches(driver: &Wiedemann99, gap_m: f64) -> Vec<([(f64, f64); 2], Regime)>
 }
 
 /// Returns the values from the start of a range up to its end, at a distance of `step`.
-fn steps((from, to): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
+pub(crate) fn steps((from, to): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
     (0..).map(move |index| from + f64::from(index) * step).take_while(move |value| *value < to)
 }
 

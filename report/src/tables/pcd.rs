@@ -10,6 +10,7 @@
 //! | `intensity` | F 4 | as in the table |
 //! | `beam` | U 2 | as in the table |
 //! | `time` | F 8 | time of measurement (s) |
+//! | `echo_pulse_width_ns` | F 4 | as in the table |
 //!
 //! `scans.csv` lists the files with the end of each scan, and `poses.csv` and `labels.csv` have the poses of the ego and the other
 //! vehicles (`crate::tables::companions`). The points are already in the ego's frame, so the viewpoint of each file is the identity. The
@@ -56,7 +57,7 @@ impl PcdFolder {
         self.folder.path()
     }
 
-    /// Writes the latest scan of a LiDAR as its scan number `frame`.
+    /// Writes the latest scan of a LiDAR, which must be complete, as its scan number `frame`.
     pub(crate) fn write(&self, mounted: &MountedLidar<'_>, frame: u32, lidar: &RearLidar) -> io::Result<()> {
         let path = self.folder.path().join(file_name(mounted, frame));
         let mut file = io::BufWriter::new(fs::File::create(path)?);
@@ -66,10 +67,10 @@ impl PcdFolder {
             file,
             "# .PCD v0.7 - Point Cloud Data file format\n\
              VERSION 0.7\n\
-             FIELDS x y z intensity beam time\n\
-             SIZE 4 4 4 4 2 8\n\
-             TYPE F F F F U F\n\
-             COUNT 1 1 1 1 1 1\n\
+             FIELDS x y z intensity beam time echo_pulse_width_ns\n\
+             SIZE 4 4 4 4 2 8 4\n\
+             TYPE F F F F U F F\n\
+             COUNT 1 1 1 1 1 1 1\n\
              WIDTH {points}\n\
              HEIGHT 1\n\
              VIEWPOINT 0 0 0 1 0 0 0\n\
@@ -78,12 +79,13 @@ impl PcdFolder {
         )?;
         for point in 0..points {
             let [x_m, y_m] = [scan.x_m[point], scan.y_m[point]].map(|at_m| sign(mounted) * at_m);
-            for value in [x_m, y_m, scan.z_m[point], scan.intensity[point]] {
+            for value in [x_m, y_m, scan.z_m[point], scan.echoes.intensity[point]] {
                 file.write_all(&value.to_le_bytes())?;
             }
             file.write_all(&scan.beam[point].to_le_bytes())?;
             let time_s = scan.start.s() + f64::from(scan.offset_ns[point]) / NS_PER_S;
             file.write_all(&time_s.to_le_bytes())?;
+            file.write_all(&scan.echoes.pulse_width_ns[point].to_le_bytes())?;
         }
         file.flush()
     }

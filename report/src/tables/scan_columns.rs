@@ -33,6 +33,7 @@ pub(crate) struct ScanColumns {
     sensor_x_m: Vec<f32>,
     at_m: [Vec<f32>; 3],
     intensity: Vec<f32>,
+    echo_pulse_width_ns: Vec<f32>,
     offset_ns: Vec<u32>,
     cluster: Vec<Option<i32>>,
     source: Vec<String>,
@@ -45,7 +46,8 @@ impl ScanColumns {
         self.frame.len()
     }
 
-    /// Appends the latest scan of a LiDAR as its scan number `frame`. `actor` names an actor.
+    /// Appends the latest scan of a LiDAR, which must be complete, as its scan number `frame`. `actor`
+    /// names an actor.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "angles in single precision, as the pattern; fewer clusters than points"
@@ -83,7 +85,8 @@ impl ScanColumns {
             self.at_m[0].push(sign(mounted) * scan.x_m[point]);
             self.at_m[1].push(sign(mounted) * scan.y_m[point]);
             self.at_m[2].push(scan.z_m[point]);
-            self.intensity.push(scan.intensity[point]);
+            self.intensity.push(scan.echoes.intensity[point]);
+            self.echo_pulse_width_ns.push(scan.echoes.pulse_width_ns[point]);
             self.offset_ns.push(scan.offset_ns[point]);
             self.source.push(match truth.points[point].source {
                 PointSource::Actor(index) => actor(index),
@@ -113,6 +116,7 @@ impl ScanColumns {
             single("y_m", "m"),
             single("z_m", "m"),
             required("intensity", DataType::Float32, None),
+            single("echo_pulse_width_ns", "ns"),
             required("offset_ns", DataType::UInt32, Some("ns")),
             field("cluster", DataType::Int32, None),
             required("source", DataType::Utf8, None),
@@ -144,6 +148,7 @@ impl ScanColumns {
             y_m,
             z_m,
             single(rows.intensity),
+            single(rows.echo_pulse_width_ns),
             Arc::new(UInt32Array::from(rows.offset_ns)),
             Arc::new(Int32Array::from(rows.cluster)),
             Arc::new(StringArray::from(rows.source)),

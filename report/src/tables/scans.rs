@@ -11,7 +11,8 @@
 //! | `range_m` | measured range (m) |
 //! | `sensor_x_m` | place of the sensor ahead of the ego's centre, by the measured pitch (m) |
 //! | `x_m`, `y_m`, `z_m` | the point in the ego's vehicle frame at the end of the scan (m), with the ego's motion and measured pitch compensated |
-//! | `intensity` | received power times range², scaled to the reflectivity of a target that fills the beam |
+//! | `intensity` | received power times range², scaled to the reflectivity of a target that fills the beam; the losses of the window are in it |
+//! | `echo_pulse_width_ns` | time for which the echo exceeds the detection threshold (ns) |
 //! | `offset_ns` | time of measurement after the start of the sweep (ns) |
 //! | `cluster` | number of the box that the point belongs to; null for ground, rails and noise |
 //! | `source`, `true_range_m` | the truth: the name of the actor, or `ground`, `guard-rail`, `spray`, `fog`, `false`; and the range without noise (m) |

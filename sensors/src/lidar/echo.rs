@@ -159,6 +159,65 @@ impl Echoes {
     }
 }
 
+/// Returns the variances of the range within the echoes of a beam (m²), in the order in which
+/// [`Echoes::set`] gives them: the mean square distance of the sub-rays from their mean range,
+/// weighted by power.
+pub(crate) fn range_variances_m2((hits, elevation): (&BeamHits, &Elevation), faces: &[Face]) -> [f32; SUBRAYS] {
+    let mut parts = [(0.0, 0.0); SUBRAYS];
+    let mut count = 0;
+    for subray in (0..SUBRAYS).filter(|&subray| hits.inverse[subray] > 0.0) {
+        let per_range = hits.inverse[subray] * elevation.cos[subray / SUBRAY_COLUMNS];
+        parts[count] = (1.0 / per_range, received_power(per_range, faces[hits.face[subray] as usize].strength_m));
+        count += 1;
+    }
+    variances_m2(&mut parts[..count])
+}
+
+/// Returns the variances of the range within the echoes of a beam that hits only the road (m²), in
+/// the order in which [`Echoes::set_ground`] gives them.
+pub(crate) fn ground_range_variances_m2([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face) -> [f32; SUBRAYS] {
+    let level = ground.inverse[0] * cos + ground.inverse[1] * sin;
+    let mut parts = [(0.0, 0.0); SUBRAYS];
+    let mut count = 0;
+    for upward in 0..SUBRAY_ROWS {
+        let inverse = level + ground.inverse[2] * elevation.tan[upward];
+        if !(inverse > 0.0) {
+            break;
+        }
+        let per_range = inverse * elevation.cos[upward];
+        parts[count] = (1.0 / per_range, received_power(per_range, ground.strength_m));
+        count += 1;
+    }
+    variances_m2(&mut parts[..count])
+}
+
+/// Returns the variances of the range within the echoes that sub-rays of these ranges (m) and
+/// powers give (m²).
+fn variances_m2(parts: &mut [(f32, f32)]) -> [f32; SUBRAYS] {
+    parts.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+    let mut variances_m2 = [0.0; SUBRAYS];
+    let mut from = 0;
+    for variance_m2 in &mut variances_m2 {
+        let Some(&(nearest_m, _)) = parts.get(from) else { break };
+        let within = parts[from..].iter().take_while(|part| part.0 <= nearest_m + PULSE_M).count();
+        *variance_m2 = variance_of_m2(&parts[from..from + within]);
+        from += within;
+    }
+    variances_m2
+}
+
+/// Returns the variance of ranges (m) that are weighted by power (m²).
+fn variance_of_m2(parts: &[(f32, f32)]) -> f32 {
+    let weighted =
+        |value: &dyn Fn(f32) -> f32| -> f32 { parts.iter().map(|&(range_m, power)| power * value(range_m)).sum() };
+    let power = weighted(&|_| 1.0);
+    if !(power > 0.0) {
+        return 0.0;
+    }
+    let mean_m = weighted(&|range_m| range_m) / power;
+    weighted(&|range_m| (range_m - mean_m) * (range_m - mean_m)) / power
+}
+
 /// Returns the sum of several echoes as one echo. One without a range adds nothing.
 #[inline(always)]
 fn sum(parts: impl Iterator<Item = Echo>) -> Echo {
@@ -221,6 +280,58 @@ mod tests {
         assert!((split[0].0 - 10.0).abs() < 1e-4 && (split[0].1 - 0.375).abs() < 1e-4, "{split:?}");
         assert!((split[1].0 - 20.0).abs() < 1e-3 && (split[1].1 - 0.25 / 8.0).abs() < 1e-4, "{split:?}");
         assert!(echoes([None; SUBRAYS]).is_empty());
+    }
+
+    /// Returns the variances of the range within the echoes of sub-rays that hit a face at these
+    /// ranges (m²).
+    fn variances_m2_of(ranges_m: [Option<f32>; SUBRAYS]) -> [f32; SUBRAYS] {
+        let mut hits = BeamHits::NONE;
+        for (subray, range_m) in ranges_m.into_iter().enumerate() {
+            if let Some(range_m) = range_m {
+                hits.inverse[subray] = 1.0 / range_m;
+                hits.face[subray] = 0;
+            }
+        }
+        let level = Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
+        range_variances_m2((&hits, &level), &[face(10.0)])
+    }
+
+    #[test]
+    fn the_range_variance_of_a_slanted_plane_is_that_of_evenly_spaced_ranges() {
+        // Four rows, 0.1 m apart: n = 4 values with the spacing d have the variance d²·(n² − 1)/12.
+        let rows = [50.0, 50.0, 50.1, 50.1, 50.2, 50.2, 50.3, 50.3].map(Some);
+        let expected = 0.01 * 15.0 / 12.0;
+        let [variance_m2, rest @ ..] = variances_m2_of(rows);
+        assert!((variance_m2 / expected - 1.0).abs() < 0.01, "{variance_m2}");
+        assert_eq!(rest, [0.0; SUBRAYS - 1]);
+        // The rows have 15 sixteenths of the variance of the whole footprint, which is 0.4 m deep.
+        assert!((variance_m2 * 16.0 / 15.0 / (0.4 * 0.4 / 12.0) - 1.0).abs() < 0.01);
+        assert!(variances_m2_of([Some(50.0); SUBRAYS])[0] < 1e-9);
+    }
+
+    #[test]
+    fn each_echo_of_a_split_beam_has_the_range_variance_of_its_own_parts() {
+        let (near, far) = (Some(20.0), Some(30.0));
+        let [first, second, rest @ ..] = variances_m2_of([far, near, Some(20.4), None, far, near, Some(20.4), None]);
+        // Two halves, 0.4 m apart: a variance of 0.2².
+        assert!((first / 0.04 - 1.0).abs() < 0.01 && second < 1e-9, "{first} {second}");
+        assert_eq!(rest, [0.0; SUBRAYS - 2]);
+        assert_eq!(variances_m2_of([None; SUBRAYS]), [0.0; SUBRAYS]);
+    }
+
+    #[test]
+    fn a_beam_on_the_road_has_the_same_range_variance_by_both_ways() {
+        // A road 0.6 m below the sensor, in sight of four rows from 12.0 m on.
+        let ground = Face { inverse: [0.0, 0.0, -1.0 / 0.6], ..face(0.09) };
+        let tan = [-0.05, -0.0498, -0.0496, -0.0494];
+        let elevation = Elevation { group: 0, centre: [-0.0497, 1.0], tan, cos: [0.999; SUBRAY_ROWS] };
+        let [bare, ..] = ground_range_variances_m2([1.0, 0.0], &elevation, &ground);
+        let mut hits = BeamHits::NONE;
+        for subray in 0..SUBRAYS {
+            (hits.inverse[subray], hits.face[subray]) = (tan[subray / SUBRAY_COLUMNS] / -0.6, 0);
+        }
+        let [cast, ..] = range_variances_m2((&hits, &elevation), &[ground]);
+        assert!(bare > 1e-4 && (bare / cast - 1.0).abs() < 1e-2, "{bare} {cast}");
     }
 
     #[test]

@@ -7,6 +7,8 @@
 
 use super::noise::{Noise, Purpose};
 use super::pattern::Pattern;
+use super::power::LinkBudget;
+use super::pulse;
 use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
 use super::{LidarScan, Material, PointSource, PointTruth, ScanTruth};
 
@@ -22,8 +24,7 @@ pub(super) struct FalseAlarms<'a> {
     pub(super) rate: f64,
     /// Range up to which the receiver listens (m).
     pub(super) reach_m: f32,
-    /// Received power for ρ·cos γ·f = 1 at 1 m (thresholds · m²).
-    pub(super) gain_m2: f32,
+    pub(super) link: &'a LinkBudget,
     pub(super) noise: Noise,
     pub(super) pattern: &'a Pattern,
 }
@@ -76,7 +77,8 @@ impl FalseAlarms<'_> {
         scan.x_m.push(x);
         scan.y_m.push(y);
         scan.z_m.push(z);
-        scan.intensity.push((range_m * range_m / self.gain_m2).min(MAX_INTENSITY));
+        scan.intensity.push((range_m * range_m / self.link.gain_m2).min(MAX_INTENSITY));
+        scan.echoes.note(|| [pulse::width_ns(1.0, 0.0), self.link.reported_intensity(1.0, range_m)]);
         scan.offset_ns.push(column.offset_ns);
         scan.beam.push(beam as u16);
     }

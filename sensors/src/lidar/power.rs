@@ -23,6 +23,7 @@ use closecall_traffic::{Environment, KOSCHMIEDER, maths, rain_db_per_km};
 
 use super::Lidar;
 use super::kind::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
+use super::receiver::MAX_INTENSITY;
 
 /// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations,
 /// and cannot raise the return above the threshold.
@@ -40,6 +41,8 @@ const FOG_FROM_PER_M: f32 = 0.004;
 pub(crate) struct LinkBudget {
     /// Received power for ρ·cos γ·f = 1 at 1 m without attenuation (thresholds · m²).
     pub(crate) gain_m2: f32,
+    /// The same behind a clean window (thresholds · m²).
+    pub(crate) clean_gain_m2: f32,
     /// Extinction coefficient α of the air (1/m).
     pub(crate) extinction_per_m: f32,
     /// Standard deviation of the measured range at high power, and the additional one at the
@@ -56,6 +59,7 @@ impl LinkBudget {
         Self {
             // The window attenuates the light on the way out and on the way back.
             gain_m2: ((lidar.nominal_range_m * lidar.window_transmission).powi(2) / NOMINAL_REFLECTIVITY) as f32,
+            clean_gain_m2: (lidar.nominal_range_m.powi(2) / NOMINAL_REFLECTIVITY) as f32,
             extinction_per_m: extinction_per_m(environment) as f32,
             range_sd_m: lidar.kind.range_sd_m,
             max_range_m: if lidar.is_exact { f32::INFINITY } else { lidar.kind.max_range_m },
@@ -68,6 +72,12 @@ impl LinkBudget {
         let [strong, at_threshold] = self.range_sd_m;
         let weak = at_threshold / power.max(1.0);
         (strong * strong + weak * weak).sqrt()
+    }
+
+    /// Returns the intensity that the sensor reports for a return of this power (thresholds) at this
+    /// range (m). The sensor is calibrated behind a clean window and does not know of dirt.
+    pub(crate) fn reported_intensity(&self, power: f32, range_m: f32) -> f32 {
+        (power * (range_m * range_m) / self.clean_gain_m2).min(MAX_INTENSITY)
     }
 
     /// Returns true if the air contains enough droplets for detectable backscatter.
@@ -98,6 +108,21 @@ mod tests {
     fn the_nominal_target_is_at_the_threshold() {
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         assert!((link.gain_m2 * 0.5 / (200.0 * 200.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_reported_intensity_falls_with_the_square_of_the_window_transmission() {
+        let at = |window_transmission| {
+            let lidar = Lidar { window_transmission, ..Lidar::default() };
+            let link = LinkBudget::new(&lidar, &Environment::CLEAR_DAY);
+            // A surface of reflectivity 0.5 that fills the beam at 50 m.
+            link.reported_intensity(0.5 * link.gain_m2 / 2_500.0, 50.0)
+        };
+        assert!((at(1.0) - 0.5).abs() < 1e-6 && (at(0.6) - 0.18).abs() < 1e-6, "{} {}", at(1.0), at(0.6));
+        assert_eq!(at(0.0), 0.0);
+        // The receiver saturates at what it receives, not at what would come through a clean window.
+        let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        assert_eq!(link.reported_intensity(1e6, 50.0), MAX_INTENSITY);
     }
 
     #[test]

@@ -94,7 +94,8 @@ impl RearLidar {
     }
 
     /// Returns this LiDAR with the complete latest scan: with the points of the bare road, which
-    /// the simulation leaves out because the detector discards them. The detections are the same.
+    /// the simulation leaves out because the detector discards them, and with
+    /// [`LidarScan::echoes`]. The detections are the same.
     ///
     /// # Errors
     /// Returns the errors of [`Detector::detect`].

@@ -7,11 +7,12 @@
 use fearless_simd::Simd;
 
 use super::cast::ColumnHits;
-use super::echo::{Echo, Echoes};
+use super::echo::{Echo, Echoes, ground_range_variances_m2, range_variances_m2};
 use super::kind::THRESHOLD_OVER_NOISE;
 use super::noise::{Noise, Purpose};
-use super::pattern::{Column, Elevation};
+use super::pattern::{Column, Elevation, SUBRAYS};
 use super::power::MIN_POWER;
+use super::pulse::{self, DROPLET_VARIANCE_M2};
 use super::soft::{self, Air, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
 use super::targets::{LayerMask, Targets};
 use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
@@ -145,6 +146,8 @@ impl SensorPoseEstimate {
 struct PotentialReturn {
     range_m: f32,
     power: f32,
+    /// Variance of the range within the echo (m²). 0 for a surface unless the scan notes its echoes.
+    range_variance_m2: f32,
     source: PointSource,
     material: Material,
 }
@@ -184,6 +187,7 @@ impl Receiver<'_> {
         (scan, truth): (&mut LidarScan, &mut ScanTruth),
     ) {
         let in_air = !self.plumes.is_empty() || self.air.link.has_fog();
+        let are_noted = scan.echoes.are_noted;
         let mut echoes = Echoes::NONE;
         let mut left = layers;
         while left != 0 {
@@ -191,21 +195,27 @@ impl Receiver<'_> {
             left &= left - 1;
             let elevation = &self.elevations[layer];
             let droplets = in_air.then(|| droplets.computed(layer).unwrap_or_else(|| self.droplet_effect(layer)));
+            let mut variances_m2 = None;
             if hits.is_tested(layer) {
-                echoes.set(simd, (&hits.beams[layer], elevation), &self.targets.faces, self.air.link);
+                let beam = (&hits.beams[layer], elevation);
+                echoes.set(simd, beam, &self.targets.faces, self.air.link);
+                variances_m2 = are_noted.then(|| range_variances_m2(beam, &self.targets.faces));
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[elevation.group];
-                echoes.set_ground(centre, elevation, &self.targets.faces[0], self.air.link);
+                let ground = &self.targets.faces[0];
+                echoes.set_ground(centre, elevation, ground, self.air.link);
+                variances_m2 = are_noted.then(|| ground_range_variances_m2(centre, elevation, ground));
             } else {
                 echoes.clear();
             }
             let into = (&mut *scan, &mut *truth);
+            let variances_m2 = variances_m2.as_ref();
             match droplets {
                 Some(droplets) => {
                     let transmission = |range_m| droplets.transmission(range_m);
-                    self.detect(layer, (echoes.as_slice(), droplets.echo), transmission, into);
+                    self.detect(layer, (echoes.as_slice(), droplets.echo, variances_m2), transmission, into);
                 }
-                None => self.detect(layer, (echoes.as_slice(), None), |_| 1.0, into),
+                None => self.detect(layer, (echoes.as_slice(), None, variances_m2), |_| 1.0, into),
             }
         }
     }
@@ -234,12 +244,12 @@ impl Receiver<'_> {
     }
 
     /// Appends the first and the last detected return of a beam to the scan and to its ground
-    /// truth.
+    /// truth. The variances of the range within the echoes are `None` unless the scan notes them.
     #[inline(always)]
     fn detect(
         &self,
         layer: usize,
-        (echoes, soft): (&[Echo], Option<SoftEcho>),
+        (echoes, soft, variances_m2): (&[Echo], Option<SoftEcho>, Option<&[f32; SUBRAYS]>),
         transmission: impl Fn(f32) -> f32,
         (scan, truth): (&mut LidarScan, &mut ScanTruth),
     ) {
@@ -248,10 +258,11 @@ impl Receiver<'_> {
         let soft = soft.filter(before_hard).map(|soft| PotentialReturn {
             range_m: soft.range_m,
             power: soft.power,
+            range_variance_m2: DROPLET_VARIANCE_M2,
             source: soft.source,
             material: Material::Water,
         });
-        let hard = echoes.iter().map(|echo| {
+        let hard = echoes.iter().enumerate().map(|(index, echo)| {
             let face = &self.targets.faces[echo.face as usize];
             // The air can only attenuate: an echo that is too weak without attenuation needs no
             // exponential.
@@ -260,7 +271,8 @@ impl Receiver<'_> {
                 if is_strong { self.air.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
             let power = echo.power * through;
             let range_m = self.targets.drifted_m(echo.face, echo.range_m, self.column.offset_ns);
-            PotentialReturn { range_m, power, source: face.source, material: face.material }
+            let range_variance_m2 = variances_m2.map_or(0.0, |variances_m2| variances_m2[index]);
+            PotentialReturn { range_m, power, range_variance_m2, source: face.source, material: face.material }
         });
         let (mut is_first, mut last) = (true, None);
         for (index, potential) in soft.into_iter().chain(hard).enumerate() {
@@ -306,6 +318,11 @@ impl Receiver<'_> {
         scan.z_m.push(z);
         let square = detected.measured_m * detected.measured_m;
         scan.intensity.push((detected.measured_power * square / self.air.link.gain_m2).min(MAX_INTENSITY));
+        let DetectedReturn { potential, measured_m, measured_power } = *detected;
+        scan.echoes.note(|| {
+            let width_ns = pulse::width_ns(measured_power, potential.range_variance_m2);
+            [width_ns, self.air.link.reported_intensity(measured_power, measured_m)]
+        });
         scan.offset_ns.push(self.column.offset_ns);
         #[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 65,535 beams")]
         scan.beam.push((self.column_index * self.elevations.len() + layer) as u16);

@@ -15,8 +15,9 @@ use nalgebra::{Rotation3, Vector3};
 use super::ground::ground_reach_m;
 use super::pattern::Pattern;
 use super::power::LinkBudget;
+use super::receiver::MAX_INTENSITY;
 use super::viewpoint::{deskew, sensor_position_m, turned_axes};
-use super::{Lidar, LidarScan, MirrorSide};
+use super::{Lidar, LidarScan, MirrorSide, ScanEchoes};
 use closecall_traffic::Environment;
 
 /// Intensity of the points of a sensor that records none (assumption): neither a droplet nor a
@@ -233,9 +234,13 @@ impl RecordedPoints {
             x_m,
             y_m,
             z_m,
-            intensity: self.intensity.unwrap_or_else(|| vec![UNKNOWN_INTENSITY; count]),
+            intensity: match self.intensity {
+                Some(values) => behind_clean_window(values, lidar.window_transmission),
+                None => vec![UNKNOWN_INTENSITY; count],
+            },
             offset_ns,
             beam,
+            echoes: ScanEchoes::default(),
         };
         Ok((scan, outside))
     }
@@ -303,6 +308,17 @@ impl RecordedPoints {
             }
         }
     }
+}
+
+/// Returns the intensities that a clean window would give. The scenario states the share of the
+/// light that the window of the sensor transmits each way.
+#[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+fn behind_clean_window(mut intensities: Vec<f32>, window_transmission: f64) -> Vec<f32> {
+    if window_transmission > 0.0 && window_transmission < 1.0 {
+        let share = (window_transmission * window_transmission) as f32;
+        intensities.iter_mut().for_each(|value| *value = (*value / share).min(MAX_INTENSITY));
+    }
+    intensities
 }
 
 /// Returns the beam whose centre is nearest to a direction in the sensor's frame; `None` if the

@@ -47,12 +47,54 @@ pub struct LidarScan {
     /// Height of each point above the ground (m).
     pub z_m: Vec<f32>,
     /// Intensity of each point: received power × range², scaled to the reflectivity of a target
-    /// that faces the sensor and fills the beam.
+    /// that faces the sensor and fills the beam, as if the window were clean.
     pub intensity: Vec<f32>,
     /// Time of measurement of each point after `start` (ns).
     pub offset_ns: Vec<u32>,
     /// Beam of each point, as column · layers + layer.
     pub beam: Vec<u16>,
+    /// What the sensor reports of the echo of each point. Empty unless the scan is complete (see
+    /// [`RearLidar::completed`](super::RearLidar::completed)): the processing chain does not read it.
+    pub echoes: ScanEchoes,
+}
+
+/// What a sensor reports of the echoes of a complete scan: one entry for each return.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScanEchoes {
+    /// Whether the entries are written.
+    pub(crate) are_noted: bool,
+    /// Echo pulse width of each point: the time for which its echo exceeds the detection threshold
+    /// (ns).
+    pub pulse_width_ns: Vec<f32>,
+    /// Intensity of each point as a sensor reports it that does not know the state of its window:
+    /// the two-way transmission of the window is in it.
+    pub intensity: Vec<f32>,
+}
+
+impl ScanEchoes {
+    /// Appends the echo of a point, by its width (ns) and its intensity, if entries are written.
+    #[inline(always)]
+    pub(crate) fn note(&mut self, echo: impl FnOnce() -> [f32; 2]) {
+        if self.are_noted {
+            let [width_ns, intensity] = echo();
+            self.pulse_width_ns.push(width_ns);
+            self.intensity.push(intensity);
+        }
+    }
+
+    /// Copies the entry of the point `from` to the point `to`.
+    pub(crate) fn copy(&mut self, from: usize, to: usize) {
+        if self.are_noted {
+            self.pulse_width_ns[to] = self.pulse_width_ns[from];
+            self.intensity[to] = self.intensity[from];
+        }
+    }
+
+    /// Keeps the first entries alone.
+    pub(crate) fn truncate(&mut self, points: usize) {
+        self.pulse_width_ns.truncate(points);
+        self.intensity.truncate(points);
+    }
 }
 
 impl LidarScan {
@@ -81,6 +123,7 @@ impl LidarScan {
         self.intensity.clear();
         self.offset_ns.clear();
         self.beam.clear();
+        self.echoes.truncate(0);
     }
 }
 

@@ -139,8 +139,9 @@ impl Scanner {
         &self.truth
     }
 
-    /// Adds the points that the latest scan leaves out.
+    /// Adds the points that the latest scan leaves out, and what the sensor reports of all echoes.
     pub fn complete(&mut self) {
+        self.scan.echoes.are_noted = true;
         self.repeat(Extent::Complete);
     }
 
@@ -233,6 +234,7 @@ impl Scanner {
             fault,
             noise: sweep.noise.of_faults(),
             pose: &sweep.pose,
+            link: &sweep.link,
             pattern: self.pattern,
             mirror_side: sweep.mirror_side,
             rails: rails.as_ref(),
@@ -357,6 +359,7 @@ impl Scanner {
         self.clear();
         self.stamp(end);
         self.scan.mirror_side = mirror_side;
+        self.scan.echoes.are_noted = false;
         let (mount_height_m, ground_reach_m) = (self.lidar.mount_height_m, self.ground_reach_m);
         let threshold_per_m2 = 1.0 / f64::from(link.gain_m2);
         self.scan.resolution =

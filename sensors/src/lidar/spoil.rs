@@ -19,6 +19,8 @@
 
 use super::noise::{Noise, Purpose};
 use super::pattern::{Elevation, Pattern};
+use super::power::LinkBudget;
+use super::pulse;
 use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
 use super::{LaneGeometry, LidarScan, Material, MirrorSide, PointSource, PointTruth, ScanTruth};
 use crate::faults::LidarFault;
@@ -36,6 +38,8 @@ const BURST_RANGE_M: [f32; 2] = [3.0, 150.0];
 const BURST_DRIFT_M: f32 = 0.5;
 /// Intensity of a false point, as a reflectivity (assumption: a usual surface).
 const FALSE_INTENSITY: f32 = 0.3;
+/// Least square of a distance for which a power is computed (m²).
+const LEAST_SQUARE_M2: f32 = 0.01;
 /// Standard deviation of the range of a point of a halo (m).
 const HALO_RANGE_SD_M: f32 = 0.1;
 /// Share of a plate's saturated returns that have a halo point at its centre; it falls linearly to
@@ -54,6 +58,7 @@ pub(super) struct Spoiler<'a> {
     pub(super) fault: &'a LidarFault,
     pub(super) noise: Noise,
     pub(super) pose: &'a SensorPoseEstimate,
+    pub(super) link: &'a LinkBudget,
     pub(super) pattern: &'a Pattern,
     pub(super) mirror_side: MirrorSide,
     /// The road as seen from the ego, if guard rails stand along it.
@@ -88,6 +93,7 @@ impl Spoiler<'_> {
             scan.y_m.push(point.at_m[1]);
             scan.z_m.push(point.at_m[2]);
             scan.intensity.push(point.intensity);
+            scan.echoes.note(|| self.echo(&point));
             scan.offset_ns.push(point.offset_ns);
             scan.beam.push(point.beam);
             truth.points.push(point.truth);
@@ -103,6 +109,14 @@ impl Spoiler<'_> {
         // Two returns of a beam are neighbours in the scan, so that the parity of the index tells
         // them apart.
         f64::from(self.noise.uniform((index % 2) * self.pattern.kind().beams() + usize::from(beam), purpose))
+    }
+
+    /// Returns the echo pulse width (ns) and the reported intensity of an added point: those of the
+    /// surface whose intensity it has, behind the same window.
+    fn echo(&self, point: &Added) -> [f32; 2] {
+        let square_m2: f32 = point.at_m.iter().zip(self.sensor_m()).map(|(at, sensor)| (at - sensor).powi(2)).sum();
+        let power = point.intensity * self.link.gain_m2 / square_m2.max(LEAST_SQUARE_M2);
+        [pulse::width_ns(power, 0.0), point.intensity * (self.link.gain_m2 / self.link.clean_gain_m2)]
     }
 
     /// Returns the position of the sensor (m).
@@ -248,6 +262,7 @@ impl Spoiler<'_> {
             scan.y_m[kept] = scan.y_m[index];
             scan.z_m[kept] = scan.z_m[index];
             scan.intensity[kept] = scan.intensity[index];
+            scan.echoes.copy(index, kept);
             scan.offset_ns[kept] = scan.offset_ns[index];
             scan.beam[kept] = scan.beam[index];
             truth.points[kept] = truth.points[index];
@@ -257,6 +272,7 @@ impl Spoiler<'_> {
         scan.y_m.truncate(kept);
         scan.z_m.truncate(kept);
         scan.intensity.truncate(kept);
+        scan.echoes.truncate(kept);
         scan.offset_ns.truncate(kept);
         scan.beam.truncate(kept);
         truth.points.truncate(kept);

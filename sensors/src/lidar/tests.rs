@@ -5,6 +5,7 @@ mod bare_road;
 mod boxes;
 mod cast;
 mod counts;
+mod echoes;
 mod motion;
 mod parts;
 mod surroundings;

@@ -137,6 +137,7 @@ struct ScanMessage<'a> {
     y_m: String,
     z_m: String,
     intensity: String,
+    echo_pulse_width_ns: String,
     beam: String,
     offset_ns: String,
 }
@@ -264,7 +265,8 @@ fn scan_message(outside: &OutsideScan) -> ScanMessage<'_> {
         x_m: single(&scan.x_m),
         y_m: single(&scan.y_m),
         z_m: single(&scan.z_m),
-        intensity: single(&scan.intensity),
+        intensity: single(&scan.echoes.intensity),
+        echo_pulse_width_ns: single(&scan.echoes.pulse_width_ns),
         beam: encoded(scan.beam.iter().flat_map(|beam| beam.to_le_bytes())),
         offset_ns: encoded(scan.offset_ns.iter().flat_map(|offset_ns| offset_ns.to_le_bytes())),
     }

@@ -43,7 +43,7 @@ impl Scanner {
             let alarms = FalseAlarms {
                 rate: self.lidar.false_alarm_rate,
                 reach_m: (self.lidar.nominal_range_m as f32).min(sweep.link.max_range_m),
-                gain_m2: sweep.link.gain_m2,
+                link: &sweep.link,
                 noise: sweep.noise.of_false_alarms(),
                 pattern: self.pattern,
             };

@@ -1,0 +1,78 @@
+//! Draws the echo pulse widths that the model of the SCALA 2 predicts, beside the published widths of
+//! a LiDAR of the same maker.
+//!
+//! ```sh
+//! cargo run --release -p closecall-xtask -- plot-echo-widths docs/evidence/echo-width.svg
+//! ```
+//!
+//! The lines are for surfaces that face the sensor and fill its beam. The marks are three boards of
+//! reflectivity 0.5 before an Ibeo LUX 2010 (`docs/evidence/lidar.md` has the source). The source
+//! gives lengths, without saying whether light passes them once or twice.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use closecall_sensors::lidar::{LidarConfig, echo_pulse_width_ns};
+use closecall_traffic::{Check, Num, Parameters};
+use plotters::prelude::*;
+
+use crate::plot_regimes::steps;
+
+/// Ranges of the axes: range (m) and echo pulse width (ns).
+const RANGE_M: (f64, f64) = (0.0, 220.0);
+const WIDTH_NS: (f64, f64) = (0.0, 24.0);
+const NEAREST_M: f64 = 5.0;
+const STEP_M: f64 = 0.5;
+const SIZE_PX: (u32, u32) = (900, 560);
+/// Length of light in a nanosecond (m).
+const M_PER_NS: f64 = 0.299_792_458;
+/// Name, reflectivity and window transmission of each line.
+const LINES: [(&str, f64, f64); 4] = [
+    ("plate in use (20π)", 62.83, 1.0),
+    ("reflectivity 0.5", 0.5, 1.0),
+    ("reflectivity 0.5, window transmits 0.5", 0.5, 0.5),
+    ("reflectivity 0.1", 0.1, 1.0),
+];
+/// Range (m) and published echo pulse width (m) of the boards.
+const MEASURED: [(f64, f64); 3] = [(19.865, 1.829), (14.995, 1.989), (9.984, 2.029)];
+
+pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
+    let path: PathBuf = words.into_iter().next().ok_or("give the path of the SVG to write")?.into();
+    let area = SVGBackend::new(&path, SIZE_PX).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .caption("Echo pulse width", ("sans-serif", 22))
+        .margin(12)
+        .x_label_area_size(46)
+        .y_label_area_size(56)
+        .build_cartesian_2d(RANGE_M.0..RANGE_M.1, WIDTH_NS.0..WIDTH_NS.1)?;
+    chart.configure_mesh().light_line_style(WHITE).x_desc("range [m]").y_desc("echo pulse width [ns]").draw()?;
+    for (index, (name, reflectivity, window_transmission)) in LINES.into_iter().enumerate() {
+        let config = LidarConfig { window_transmission: Num::Fixed(window_transmission), ..LidarConfig::default() };
+        let lidar = config.check(&Parameters::default())?;
+        let point = |range_m: f64| (range_m, echo_pulse_width_ns(&lidar, reflectivity, range_m));
+        let points = steps((NEAREST_M, RANGE_M.1), STEP_M).map(point).filter(|(_, width_ns)| *width_ns > 0.0);
+        let line = Palette99::pick(index).stroke_width(2);
+        chart
+            .draw_series(LineSeries::new(points, line))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], line));
+    }
+    let readings = [("LUX 2010, if light passes the length twice", 2.0), ("LUX 2010, if light passes it once", 1.0)];
+    for (index, (name, passes)) in readings.into_iter().enumerate() {
+        let mark = Palette99::pick(LINES.len() + index).filled();
+        let points = MEASURED.map(|(range_m, length_m)| (range_m, passes * length_m / M_PER_NS));
+        chart
+            .draw_series(points.into_iter().map(|point| Circle::new(point, 4, mark)))?
+            .label(name)
+            .legend(move |(x, y)| Circle::new((x + 8, y), 4, mark));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK)
+        .draw()?;
+    area.present()?;
+    Ok(())
+}
