@@ -133,8 +133,8 @@ impl MisSettings {
 
     /// Front time headway that the extended system gains (s): an assumption; 2 (the paper's gain) to
     /// 2.5 are plausible. The reserve is for rear vehicles that arrive before the prediction. With
-    /// 2.5 s the ego loses 1 s in a mean encounter.
-    pub const EXTENDED_THW_GAIN_S: f64 = 2.25;
+    /// 2.25 s the ego loses more than 1 s in a mean encounter.
+    pub const EXTENDED_THW_GAIN_S: f64 = 2.15;
 
     /// Speed deficit to the lead vehicle from which on the extended system takes no more speed (m/s):
     /// an assumption; 7 to 10 are plausible. The release of the brake adds about 1 m/s, and the gain
