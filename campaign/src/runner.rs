@@ -143,7 +143,8 @@ impl ArmRun {
 /// [`SampleError::Scenario`] if the sampled values contradict each other.
 pub fn concrete(file: &ScenarioFile, sampling: Sampling, sample: u64) -> Result<Scenario, SampleError> {
     let parameters = file.space().sample(sampling.design, sampling.seed, sample, sampling.samples);
-    file.config().check(&parameters).map_err(SampleError::Scenario)
+    let scenario = file.config().check(&parameters).map_err(SampleError::Scenario)?;
+    Ok(file.with_program_folder(scenario))
 }
 
 /// Runs one sample in one arm. A panic is returned as an error of the sample.

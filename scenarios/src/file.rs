@@ -289,6 +289,12 @@ impl ScenarioFile {
         self.with_folder(sensors).program()
     }
 
+    /// Returns a scenario whose perception program runs in the folder of this file's programs.
+    #[must_use]
+    pub fn with_program_folder(&self, scenario: Scenario) -> Scenario {
+        Scenario { sensors: self.with_folder(scenario.sensors), ..scenario }
+    }
+
     /// Returns sensors whose program runs in the folder of this file's programs.
     fn with_folder(&self, sensors: Sensors) -> Sensors {
         self.program_folder.as_ref().map_or(sensors, |folder| sensors.with_program_in(folder))
@@ -397,8 +403,7 @@ impl ScenarioFile {
     /// Works like [`Self::concrete`]. The message of an error has the values of `named`, too.
     fn concrete_at(&self, parameters: &Parameters, named: &[String]) -> Result<Scenario, ScenarioError> {
         let checked = self.config.check(parameters);
-        let in_folder = |scenario: Scenario| Scenario { sensors: self.with_folder(scenario.sensors), ..scenario };
-        checked.map(in_folder).map_err(|source| {
+        checked.map(|scenario| self.with_program_folder(scenario)).map_err(|source| {
             let near = match parameters_near(&self.text, &source.path) {
                 Some(near) => near,
                 None if named.is_empty() => parameters.iter().map(|(name, _)| name.as_str().to_owned()).collect(),

@@ -209,7 +209,8 @@ impl Case {
     pub fn concrete(&self, settings: &[Setting]) -> Result<Scenario, CausesError> {
         let file = ScenarioFile::parse(self.file.path(), self.file.text(), settings)?;
         let parameters = self.sampled_of(&file);
-        file.config().check(&parameters).map_err(|source| self.failed(SampleError::Scenario(source)))
+        let scenario = file.config().check(&parameters).map_err(|source| self.failed(SampleError::Scenario(source)))?;
+        Ok(self.file.with_program_folder(scenario))
     }
 
     /// Runs the sample with further settings.

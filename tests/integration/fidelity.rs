@@ -268,7 +268,7 @@ fn fast_samples_that_cannot_sharpen_a_rate_are_refused_before_a_sample_runs() {
         assert!(message(&refused).contains(said), "{said}: {}", message(&refused));
         assert!(!out.exists(), "{words}");
     }
-    let nowhere = closecall(format!("campaign {object} --no-out").split_whitespace());
+    let nowhere = closecall(format!("campaign {object}").split_whitespace());
     assert_eq!(code(&nowhere), 2);
     assert!(message(&nowhere).contains("leave out --no-out"), "{}", message(&nowhere));
 }

@@ -20,6 +20,7 @@ pub(crate) fn point_samples(work: &Work, points: &[Point]) -> impl Samples + use
         let point = point.ok_or_else(|| SampleError::Panic { message: "there is no such point".to_owned() })?;
         let parameters = file.space().at_normals(&point.normals);
         let scenario = guarded(|| file.config().check(&parameters).map_err(SampleError::Scenario))?;
+        let scenario = file.with_program_folder(scenario);
         Ok(run_guarded(&scenario, RunKey { seed, sample: point.noise }, arm, &mut NoObserver)?)
     })
 }
