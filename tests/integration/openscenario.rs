@@ -703,11 +703,6 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ),
         (
             "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"",
-            "dynamicsShape=\"linear\" value=\"-1e9\" dynamicsDimension=\"rate\"",
-            &["case.xosc:47: `SpeedActionDynamics`", "a rate of -12 to 12 m/s² is possible"],
-        ),
-        (
-            "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"",
             "dynamicsShape=\"linear\" value=\"-1\" dynamicsDimension=\"time\"",
             &["case.xosc:47: `SpeedActionDynamics`", "`value` is -1; a number of at least 0"],
         ),
@@ -782,6 +777,30 @@ fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written
 }
 
 #[test]
+fn an_acceleration_is_checked_where_a_vehicle_of_the_scenario_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // A vehicle starts with its target speed, whatever the rate.
+    let (right, hard) = ("dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"", "value=\"1e9\"");
+    let rate = format!("dynamicsShape=\"linear\" {hard} dynamicsDimension=\"rate\"");
+    assert!(SCENARIO.contains(right));
+    let path = written(folder.path(), &SCENARIO.replacen(right, &rate, 1), ROAD);
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    assert!(said.contains("`Ego` starts with the target speed"), "{said}");
+    fs::remove_file(&output).unwrap();
+    // The controller drives the ego, whatever its actions ask for.
+    let (right, hard) = ("value=\"2\" dynamicsDimension=\"rate\"", "value=\"40\" dynamicsDimension=\"rate\"");
+    assert!(SCENARIO.contains(right));
+    let path = written(folder.path(), &SCENARIO.replacen(right, hard, 1), ROAD);
+    let refused = imported(&path, &output, &[]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("-40.00 m/s²; -12 to 12 m/s² are possible"), "{}", message(&refused));
+    assert!(!output.exists());
+    stdout(&imported(&path, &output, &["--ego", "Slow_Truck"]), 0);
+    assert!(output.exists());
+}
+
+#[test]
 fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
@@ -814,7 +833,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("hdg=\"0\"", "hdg=\"abc\"", "road.xodr:6: `geometry`: `hdg` is `abc`"),
         ("<geometry s=\"0\"", "<geometry s=\"nan\"", "road.xodr:6: `geometry`: `s` is `nan`"),
         ("max=\"120\"", "max=\"fast\"", "road.xodr:5: `speed`: `max` is `fast`"),
-        ("max=\"120\"", "max=\"-360\"", "`max` is -100 m/s; 0 to 100 m/s"),
+        ("max=\"120\"", "max=\"-360\"", "`max` is -360 km/h; 0 to 100 m/s are needed, or `no limit`"),
         ("unit=\"km/h\"", "unit=\"knots\"", "`unit` is `knots`; one of m/s, km/h, mph"),
         ("a=\"2.5\"", "a=\"nan\"", "`width`: `a` is `nan`"),
         ("id=\"-3\"", "id=\"-3.5\"", "`lane`: `id` is -3.5; a whole number"),
