@@ -266,6 +266,8 @@ const PRECIPITATION_TYPE: [&str; 3] = ["dry", "rain", "snow"];
 const WETNESS: [&str; 5] = ["dry", "moist", "wetWithPuddles", "lowFlooded", "highFlooded"];
 const DYNAMICS_DIMENSION: [&str; 3] = ["distance", "rate", "time"];
 const DYNAMICS_SHAPE: [&str; 4] = ["cubic", "linear", "sinusoidal", "step"];
+/// The shapes whose largest acceleration determines their duration.
+const WITH_ACCELERATION: [&str; 2] = ["cubic", "sinusoidal"];
 const FOLLOWING_MODE: [&str; 2] = ["follow", "position"];
 const SPEED_TARGET_VALUE_TYPE: [&str; 2] = ["delta", "factor"];
 const LONGITUDINAL_DISPLACEMENT: [&str; 3] = ["any", "trailingReferencedEntity", "leadingReferencedEntity"];
@@ -314,7 +316,7 @@ const POSITIONS: [&str; 10] = [
     "TrajectoryPosition",
 ];
 
-static ELEMENTS: [Element; 150] = [
+static ELEMENTS: [Element; 155] = [
     element(
         "OpenSCENARIO",
         &[],
@@ -561,6 +563,15 @@ static ELEMENTS: [Element; 150] = [
     element("LateralAction", &[], &["LaneChangeAction", "LaneOffsetAction", "LateralDistanceAction"]),
     element("LaneChangeAction", &[number("targetLaneOffset")], &["LaneChangeActionDynamics", "LaneChangeTarget"]),
     element("LaneChangeActionDynamics", &TRANSITION_DYNAMICS, &[]),
+    element("LaneOffsetAction", &[boolean("continuous")], &["LaneOffsetActionDynamics", "LaneOffsetTarget"]),
+    element(
+        "LaneOffsetActionDynamics",
+        &[some("dynamicsShape", &DYNAMICS_SHAPE, &WITH_ACCELERATION), at_least_0("maxLateralAcc")],
+        &[],
+    ),
+    element("LaneOffsetTarget", &[], &["RelativeTargetLaneOffset", "AbsoluteTargetLaneOffset"]),
+    element("AbsoluteTargetLaneOffset", &[number("value")], &[]),
+    element("RelativeTargetLaneOffset", &[text("entityRef"), number("value")], &[]),
     element("LaneChangeTarget", &[], &["RelativeTargetLane", "AbsoluteTargetLane"]),
     element("AbsoluteTargetLane", &[integer("value")], &[]),
     element("RelativeTargetLane", &[text("entityRef"), integer("value")], &[]),

@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
 use super::follow::Following;
+use super::offset::Shift;
 use super::plane::nearest;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
@@ -83,6 +84,8 @@ enum Running {
     Meet { vehicle: usize, points: Vec<(f64, f64)>, meeting: Meeting },
     /// A gap to another vehicle, for ever.
     Follow(Following),
+    /// A shift within the lane.
+    Offset(Shift),
     /// A lane change, until its end.
     Lane { ends_s: f64 },
     /// A lane that a vehicle on a trajectory has from a time.
@@ -96,6 +99,8 @@ struct RunningEvent {
     /// The number of its manoeuvre in the document. Two acts may have manoeuvres of one name.
     maneuver: usize,
     is_longitudinal: Vec<usize>,
+    /// The vehicles that it moves sideways.
+    is_lateral: Vec<usize>,
     /// The names of its actions. Each ends with the event.
     names: Vec<String>,
     actions: Vec<Running>,
@@ -116,6 +121,9 @@ pub(super) struct Storyboard<'a> {
     done: BTreeSet<usize>,
     /// Time and speed of each vehicle in each step.
     pub(super) speeds: Vec<Vec<(f64, f64)>>,
+    /// Distance since the start and offset from the centre of the lane of each vehicle in each step (m).
+    pub(super) offsets: Vec<Vec<[f64; 2]>>,
+    pub(super) shifts: Vec<Shift>,
     pub(super) lane_changes: Vec<LaneChange>,
     /// The vehicles that follow another.
     pub(super) following: Vec<Following>,
@@ -130,7 +138,8 @@ pub(super) struct Storyboard<'a> {
 
 impl<'a> Storyboard<'a> {
     pub(super) fn new(reader: Reader, road: &'a ImportedRoad, vehicles: Vec<Vehicle>, ego: usize) -> Self {
-        let (speeds, moves) = (vec![Vec::new(); vehicles.len()], vec![0; vehicles.len()]);
+        let (speeds, offsets) = (vec![Vec::new(); vehicles.len()], vec![Vec::new(); vehicles.len()]);
+        let moves = vec![0; vehicles.len()];
         Self {
             reader,
             road,
@@ -143,6 +152,8 @@ impl<'a> Storyboard<'a> {
             running: Vec::new(),
             done: BTreeSet::new(),
             speeds,
+            offsets,
+            shifts: Vec::new(),
             lane_changes: Vec::new(),
             following: Vec::new(),
             moves,
@@ -178,6 +189,7 @@ impl<'a> Storyboard<'a> {
             }
             for (index, vehicle) in self.vehicles.iter().enumerate() {
                 self.speeds[index].push((self.time_s, vehicle.speed_mps));
+                self.offsets[index].push([vehicle.travelled_m, vehicle.offset_m]);
             }
             let stop = storyboard.child("StopTrigger").filter(|trigger| !trigger.children.is_empty());
             let stops = stop.is_some() && self.is_triggered(stop)?;
@@ -313,6 +325,7 @@ impl<'a> Storyboard<'a> {
             name: name.to_owned(),
             maneuver,
             is_longitudinal: Vec::new(),
+            is_lateral: Vec::new(),
             names: Vec::new(),
             actions: Vec::new(),
         };
@@ -331,8 +344,8 @@ impl<'a> Storyboard<'a> {
                 self.action(self.reader.only(inner)?.clone(), actor, &mut running)?;
             }
         }
-        // A new change of speed ends the one before.
-        let replaced = running.is_longitudinal.clone();
+        // A new change of speed ends the one before, and a new motion sideways a shift.
+        let (replaced, turned) = (running.is_longitudinal.clone(), running.is_lateral.clone());
         for other in &mut self.running {
             other.actions.retain(|action| match action {
                 Running::Speed { vehicle, .. }
@@ -340,6 +353,7 @@ impl<'a> Storyboard<'a> {
                 | Running::Profile { vehicle, .. }
                 | Running::Meet { vehicle, .. }
                 | Running::Follow(Following { vehicle, .. }) => !replaced.contains(vehicle),
+                Running::Offset(shift) => !turned.contains(&shift.vehicle),
                 Running::Lane { .. } | Running::LaneFrom { .. } => true,
             });
         }
@@ -379,9 +393,16 @@ impl<'a> Storyboard<'a> {
                 let inner = self.reader.only(&node)?.clone();
                 match inner.name.as_str() {
                     "LaneChangeAction" => self.lane_change(&inner, actor, running),
-                    _ => Err(self
-                        .reader
-                        .error(&inner, "only `LaneChangeAction` is read: a vehicle keeps the centre of its lane")),
+                    "LaneOffsetAction" => {
+                        let shift = self.lane_offset(&inner, actor)?;
+                        self.shifts.push(shift);
+                        running.is_lateral.push(actor);
+                        if shift.runs(self.time_s) {
+                            running.actions.push(Running::Offset(shift));
+                        }
+                        Ok(())
+                    }
+                    _ => Err(self.reader.error(&inner, "only `LaneChangeAction` and `LaneOffsetAction` are read")),
                 }
             }
             "RoutingAction" => {
@@ -552,6 +573,13 @@ impl<'a> Storyboard<'a> {
     }
 
     fn follow_trajectory(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        if self.vehicles[actor].offset_m != 0.0 {
+            let message = format!(
+                "`{}` is beside the centre of its lane: a trajectory begins at the centre, and keeps it",
+                self.vehicles[actor].name
+            );
+            return Err(self.reader.error(node, message));
+        }
         let mut driven = self.trajectory(node, actor)?;
         if let Some(first) = driven.speeds.first_mut() {
             first.0 = first.0.min(self.time_s);
@@ -566,6 +594,7 @@ impl<'a> Storyboard<'a> {
         }
         self.lane_changes.extend(driven.lane_changes);
         running.is_longitudinal.push(actor);
+        running.is_lateral.push(actor);
         running.actions.push(Running::Profile { vehicle: actor, points: driven.speeds });
         Ok(())
     }
@@ -592,6 +621,10 @@ impl<'a> Storyboard<'a> {
             let message = format!("lane {to} is no driving lane along the road, only {}", lanes.join(", "));
             return Err(self.reader.error(target, message));
         };
+        if from_index == to_index && self.vehicles[actor].offset_m != 0.0 {
+            let message = "it leads back to the centre of the lane: a `LaneOffsetAction` with the offset 0 is needed";
+            return Err(self.reader.error(node, message));
+        }
         if from_index == to_index {
             return Ok(());
         }
@@ -604,7 +637,8 @@ impl<'a> Storyboard<'a> {
         let (duration_s, _) =
             self.transition(dynamics, (0.0, self.road.lane_width_m), self.vehicles[actor].speed_mps)?;
         let at_s = self.time_s;
-        self.vehicles[actor].lane = to;
+        (self.vehicles[actor].lane, self.vehicles[actor].offset_m) = (to, 0.0);
+        running.is_lateral.push(actor);
         let (line, element) = (node.line, "LaneChangeAction");
         self.lane_changes.push(LaneChange { vehicle: actor, at_s, from, to, duration_s, line, element });
         running.actions.push(Running::Lane { ends_s: at_s + duration_s });
@@ -630,7 +664,7 @@ impl<'a> Storyboard<'a> {
         self.time_s = ((self.time_s + STEP_S) / STEP_S).round() * STEP_S;
         let before: Vec<f64> = self.vehicles.iter().map(|vehicle| vehicle.speed_mps).collect();
         let (time_s, vehicles) = (self.time_s, &self.vehicles);
-        let (mut set, mut lanes) = (Vec::new(), Vec::new());
+        let (mut set, mut lanes, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for event in &mut self.running {
             event.actions.retain(|action| match action {
                 Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, is_smooth } => {
@@ -657,6 +691,10 @@ impl<'a> Storyboard<'a> {
                     set.push((following.vehicle, following.next_speed_mps(vehicles)));
                     true
                 }
+                Running::Offset(shift) => {
+                    offsets.push((shift.vehicle, shift.offset_m(time_s)));
+                    shift.runs(time_s)
+                }
                 Running::Lane { ends_s } => time_s < *ends_s - 1e-9,
                 Running::LaneFrom { vehicle, at_s, lane } => {
                     let is_later = time_s < *at_s;
@@ -669,6 +707,9 @@ impl<'a> Storyboard<'a> {
         }
         for (vehicle, lane) in lanes {
             self.vehicles[vehicle].lane = lane;
+        }
+        for (vehicle, offset_m) in offsets {
+            self.vehicles[vehicle].offset_m = offset_m;
         }
         for (vehicle, speed_mps) in set {
             self.vehicles[vehicle].speed_mps = speed_mps.max(0.0);
@@ -867,9 +908,11 @@ impl<'a> Storyboard<'a> {
 
     fn place(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
         let reader = self.reader.clone();
-        if reader.number_or(node, "offset", 0.0)? != 0.0 {
-            return Err(reader.error(node, "`offset` must be 0: a vehicle starts at the centre of its lane"));
+        let offset_m = reader.number_or(node, "offset", 0.0)?;
+        if offset_m != 0.0 && vehicle == self.ego {
+            return Err(reader.error(node, "`offset` must be 0: the ego starts at the centre of its lane"));
         }
+        self.check_offset(node, "offset", offset_m)?;
         if let Some(orientation) = node.child("Orientation") {
             let heading_rad = reader.number_or(orientation, "h", 0.0)?;
             if !(heading_rad.abs() < 1e-3) {
@@ -923,7 +966,7 @@ impl<'a> Storyboard<'a> {
         }
         let placed = &mut self.vehicles[vehicle];
         placed.start = (node.line, node.name.clone());
-        (placed.s_m, placed.lane, placed.is_placed) = (s_m, lane, true);
+        (placed.s_m, placed.lane, placed.is_placed, placed.offset_m) = (s_m, lane, true, offset_m);
         Ok(())
     }
 }
