@@ -61,9 +61,11 @@ const TIME_GAP_S: f64 = 1.5;
 const LANE_CHANGE_S: [f64; 2] = [1.5, 20.0];
 /// Deviation of a profile from the speeds of the storyboard (m/s).
 const SPEED_TOLERANCE_MPS: f64 = 1e-3;
-/// Time within which a change of speed belongs to the start (s).
+/// Time within which a change of speed belongs to the start (s): an assumption; 0.01 to 0.2 are
+/// plausible.
 const AT_START_S: f64 = 0.05;
-/// Change of speed in one step of the storyboard above which no vehicle follows it (m/s).
+/// Change of speed in one step of the storyboard above which no vehicle follows it (m/s): an
+/// assumption; 0.2 to 1 are plausible.
 const JUMP_MPS: f64 = 0.5;
 /// Friction of the road with a friction scale of 1: the friction of a dry road.
 const DRY_FRICTION: f64 = 0.9;

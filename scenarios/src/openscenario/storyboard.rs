@@ -19,9 +19,10 @@ use super::world::Vehicle;
 
 /// Step of the storyboard (s): the step of esmini's tests.
 pub(super) const STEP_S: f64 = 0.01;
-/// Longest storyboard without a stop trigger that fires (s).
+/// Longest storyboard without a stop trigger that fires (s): an assumption; 100 to 1000 are plausible.
 pub(super) const LONGEST_S: f64 = 300.0;
-/// Time that is played after the last action ended (s), if no trigger stops the storyboard.
+/// Time that is played after the last action ended (s), if no trigger stops the storyboard: an
+/// assumption; 5 to 60 are plausible.
 const AFTER_LAST_S: f64 = 20.0;
 
 /// Highest speed of a scenario file (m/s).
