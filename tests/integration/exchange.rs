@@ -467,14 +467,14 @@ fn gap_time_headway_and_time_to_collision_are_those_of_crime() {
     const TOLERANCE: f64 = 1e-6;
     let Some(python) = closecall_testing::python_with_exchange() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let [trace, list] = ["trace.csv", "pairs.json"].map(|name| folder.path().join(name));
+    let [trace, list, case] = ["trace.csv", "pairs.json", "case"].map(|name| folder.path().join(name));
     stdout(&run("run busy-overtake --sensors ground-truth --trace", &trace), 0);
-    exported("busy-overtake --sensors ground-truth --form commonroad", folder.path());
+    exported("busy-overtake --sensors ground-truth --form commonroad", &case);
     let pairs = pairs(&trace);
     let queries: Vec<_> = pairs.iter().map(|pair| [pair.step, pair.obstacles[0], pair.obstacles[1]]).collect();
     fs::write(&list, serde_json::to_string(&queries).unwrap()).unwrap();
     let script = PathBuf::from(ROOT).join("tests/integration/exchange/criticality.py");
-    let output = Command::new(python).arg(script).arg(folder.path().join("commonroad.xml")).arg(list).output().unwrap();
+    let output = Command::new(python).arg(script).arg(case.join("commonroad.xml")).arg(list).output().unwrap();
     let computed: serde_json::Value = serde_json::from_str(stdout(&output, 0).lines().last().unwrap()).unwrap();
     let step_s = computed["step_s"].as_f64().unwrap();
     let results = computed["results"].as_array().unwrap();

@@ -784,7 +784,7 @@ fn with_offset(dynamics: &str, target: &str, attributes: &str) -> String {
         "<LaneOffsetAction {attributes}><LaneOffsetActionDynamics {dynamics}/>\
          <LaneOffsetTarget>{target}</LaneOffsetTarget></LaneOffsetAction>"
     );
-    [&SCENARIO[..start], &action, &SCENARIO[end..]].concat()
+    [&SCENARIO[..start], action.as_str(), &SCENARIO[end..]].concat()
 }
 
 #[test]
@@ -829,7 +829,7 @@ fn a_lane_offset_becomes_a_lateral_path_that_the_vehicle_drives() {
     let second = shift[shift.find("<LateralAction>").unwrap()..shift.find("</LateralAction>").unwrap()].to_owned();
     let brake = SCENARIO.rfind("<LongitudinalAction>").unwrap();
     let brake_end = brake + SCENARIO[brake..].find("</LongitudinalAction>").unwrap() + "</LongitudinalAction>".len();
-    let after_change = [&SCENARIO[..brake], &second, "</LateralAction>", &SCENARIO[brake_end..]].concat();
+    let after_change = [&SCENARIO[..brake], second.as_str(), "</LateralAction>", &SCENARIO[brake_end..]].concat();
     for (wrong, words) in [
         (
             with_offset(&DYNAMICS.replace("sinusoidal", "linear"), TARGET, ""),
