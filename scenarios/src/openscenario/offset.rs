@@ -206,7 +206,7 @@ mod tests {
         for is_cubic in [true, false] {
             let shift = shift(is_cubic);
             let end_s = shift.begins_s + shift.duration_s;
-            assert!((shift.offset_m(4.0)).abs() < 1e-12 && (shift.offset_m(end_s) - 1.5).abs() < 1e-12);
+            assert!(shift.offset_m(4.0).abs() < 1e-12 && (shift.offset_m(end_s) - 1.5).abs() < 1e-12);
             assert!(shift.runs(end_s - 0.01) && !shift.runs(end_s));
             let second = |at_s: f64| {
                 let [a, b, c] = [-1e-3, 0.0, 1e-3].map(|apart_s| shift.offset_m(at_s + apart_s));
