@@ -423,3 +423,95 @@ fn commonroad_io_reads_a_sample_with_its_planning_problem() {
     let ends: Vec<_> = ["1001", "1002"].map(|id| summary["obstacles"][id].as_u64().unwrap()).into();
     assert!(ends[0] > 250 && ends[0] == ends[1], "{summary}");
 }
+
+/// A follower and the vehicle ahead of it at one step of a trace.
+struct Pair {
+    step: usize,
+    /// Numbers of the two in a CommonRoad file.
+    obstacles: [usize; 2],
+    gap_m: f64,
+    thw_s: Option<f64>,
+    speeds_mps: [f64; 2],
+}
+
+/// Returns the pairs of human drivers in each 20th step of a trace. The ego is its first actor.
+fn pairs(trace: &Path) -> Vec<Pair> {
+    fn number(row: &[&str], column: usize) -> f64 {
+        row[column].parse().unwrap()
+    }
+    let text = fs::read_to_string(trace).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let actors = rows.iter().take_while(|row| row[0] == rows[0][0]).count();
+    let mut pairs = Vec::new();
+    for (step, rows) in rows.chunks(actors).enumerate().step_by(20) {
+        for (follower, row) in rows.iter().enumerate().skip(1).filter(|(_, row)| !row[7].is_empty()) {
+            let is_ahead = |other: &Vec<&str>| other[2] == row[2] && number(other, 3) > number(row, 3);
+            let ahead = rows.iter().enumerate().filter(|(_, other)| is_ahead(other));
+            let (lead, _) = ahead.min_by(|(_, a), (_, b)| number(a, 3).total_cmp(&number(b, 3))).unwrap();
+            if lead > 0 {
+                pairs.push(Pair {
+                    step,
+                    obstacles: [1_000 + follower, 1_000 + lead],
+                    gap_m: number(row, 7),
+                    thw_s: row[8].parse().ok(),
+                    speeds_mps: [number(row, 5), number(&rows[lead], 5)],
+                });
+            }
+        }
+    }
+    pairs
+}
+
+#[test]
+fn gap_time_headway_and_time_to_collision_are_those_of_crime() {
+    const TOLERANCE: f64 = 1e-6;
+    let Some(python) = closecall_testing::python_with_exchange() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [trace, list, case] = ["trace.csv", "pairs.json", "case"].map(|name| folder.path().join(name));
+    stdout(&run("run busy-overtake --sensors ground-truth --trace", &trace), 0);
+    exported("busy-overtake --sensors ground-truth --form commonroad", &case);
+    let pairs = pairs(&trace);
+    let queries: Vec<_> = pairs.iter().map(|pair| [pair.step, pair.obstacles[0], pair.obstacles[1]]).collect();
+    fs::write(&list, serde_json::to_string(&queries).unwrap()).unwrap();
+    let script = PathBuf::from(ROOT).join("tests/integration/exchange/criticality.py");
+    let output = Command::new(python).arg(script).arg(case.join("commonroad.xml")).arg(list).output().unwrap();
+    let computed: serde_json::Value = serde_json::from_str(stdout(&output, 0).lines().last().unwrap()).unwrap();
+    let step_s = computed["step_s"].as_f64().unwrap();
+    let results = computed["results"].as_array().unwrap();
+    assert_eq!(results.len(), pairs.len());
+    let (mut headways, mut collisions) = (0, 0);
+    for (pair, result) in pairs.iter().zip(results) {
+        let value = |key: &str| result[key].as_f64().unwrap_or_else(|| panic!("{key}: {result}"));
+        let place = format!("step {} of {:?}: {result}", pair.step, pair.obstacles);
+        assert!((value("hw_m") - pair.gap_m).abs() < TOLERANCE, "{place}: {} m", pair.gap_m);
+        if result["thw_alike"] == true {
+            let thw_s = pair.thw_s.unwrap();
+            assert!((value("passes_s") - thw_s).abs() < TOLERANCE, "{place}: {thw_s} s");
+            // CriMe counts whole steps.
+            let later_s = value("thw_s") - thw_s;
+            assert!((-TOLERANCE..=step_s + TOLERANCE).contains(&later_s), "{place}: {thw_s} s");
+            headways += 1;
+        }
+        // With a smaller closing speed, the time is not determined by double-precision numbers to 1e-6.
+        let closes = pair.speeds_mps[0] - pair.speeds_mps[1] > 0.1;
+        if closes && result["ttc_alike"] == true {
+            let [own_mps, lead_mps] = pair.speeds_mps;
+            let ttc_s = closecall_traffic::metrics::time_to_collision_s(pair.gap_m, own_mps, lead_mps).unwrap();
+            assert!((value("ttc_s") - ttc_s).abs() < TOLERANCE, "{place}: {ttc_s} s");
+            collisions += 1;
+        }
+        // The formulas are the ones of the package, where it is installed.
+        if let Some(package) = result["package"].as_array() {
+            let keys = ["hw_m", "thw_s", "ttc_in_package_s"];
+            let checked = if closes && result["ttc_alike"] == true { 3 } else { 2 };
+            for (of_package, key) in package.iter().zip(keys).take(checked) {
+                let is_same = match (of_package.as_f64(), result[key].as_f64()) {
+                    (Some(of_package), Some(of_formula)) => (of_package - of_formula).abs() < TOLERANCE,
+                    (of_package, of_formula) => of_package == of_formula,
+                };
+                assert!(is_same, "{place}: {key}");
+            }
+        }
+    }
+    assert!(headways > 100 && collisions > 20, "{headways} {collisions} of {}", pairs.len());
+}

@@ -703,11 +703,6 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
         ),
         (
             "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"",
-            "dynamicsShape=\"linear\" value=\"-1e9\" dynamicsDimension=\"rate\"",
-            &["case.xosc:47: `SpeedActionDynamics`", "a rate of -12 to 12 m/s² is possible"],
-        ),
-        (
-            "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"",
             "dynamicsShape=\"linear\" value=\"-1\" dynamicsDimension=\"time\"",
             &["case.xosc:47: `SpeedActionDynamics`", "`value` is -1; a number of at least 0"],
         ),
@@ -781,6 +776,116 @@ fn a_wrong_scenario_is_refused_with_file_line_and_element_and_nothing_is_written
     assert!(count >= 20, "{count}");
 }
 
+/// Returns the scenario with a shift within the lane in place of its lane change.
+fn with_offset(dynamics: &str, target: &str, attributes: &str) -> String {
+    let start = SCENARIO.find("<LaneChangeAction>").unwrap();
+    let end = start + SCENARIO[start..].find("</LaneChangeAction>").unwrap() + "</LaneChangeAction>".len();
+    let action = format!(
+        "<LaneOffsetAction {attributes}><LaneOffsetActionDynamics {dynamics}/>\
+         <LaneOffsetTarget>{target}</LaneOffsetTarget></LaneOffsetAction>"
+    );
+    [&SCENARIO[..start], action.as_str(), &SCENARIO[end..]].concat()
+}
+
+#[test]
+fn a_lane_offset_becomes_a_lateral_path_that_the_vehicle_drives() {
+    const DYNAMICS: &str = "dynamicsShape=\"sinusoidal\" maxLateralAcc=\"0.3\"";
+    const TARGET: &str = "<AbsoluteTargetLaneOffset value=\"0.8\"/>";
+    let folder = tempfile::tempdir().unwrap();
+    let (output, trace) = (folder.path().join("scenario.toml"), folder.path().join("trace.csv"));
+    let path = written(folder.path(), &with_offset(DYNAMICS, TARGET, "continuous=\"false\""), ROAD);
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    // π √(0.8 / (2 × 0.3)) = 3.628 s.
+    assert!((time_of(&said, "cut-in begins") - 3.0).abs() <= 0.011, "{said}");
+    assert!((time_of(&said, "cut-in ends") - 6.628).abs() <= 0.021, "{said}");
+    let scenario: toml::Table = toml::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
+    let points: Vec<_> = scenario["actor"][1]["path"].as_array().unwrap().iter().map(numbers).collect();
+    assert_eq!(points[0], [0.0, -5.25], "the centre of the lane");
+    assert!((points.last().unwrap()[1] + 4.45).abs() < 1e-6, "{points:?}");
+    let words = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--trace", trace.to_str().unwrap()];
+    stdout(&closecall(words), 0);
+    let text = fs::read_to_string(&trace).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let at_m = |at_s: f64| -> f64 {
+        let is_it = |row: &&Vec<&str>| row[1] == "slow-truck" && (row[0].parse::<f64>().unwrap() - at_s).abs() < 0.021;
+        rows.iter().find(is_it).unwrap()[4].parse().unwrap()
+    };
+    for (at_s, expected_m) in [(2.8, -5.25), (4.8, -4.85), (7.0, -4.45), (12.0, -4.45)] {
+        assert!((at_m(at_s) - expected_m).abs() < 0.03, "{at_s}: {}", at_m(at_s));
+    }
+    fs::remove_file(&output).unwrap();
+    // A vehicle can start beside the centre, too, and drives there until its lane change.
+    let beside = SCENARIO.replace("ds=\"$Gap\" offset=\"0\"", "ds=\"$Gap\" offset=\"-0.5\"");
+    assert_ne!(beside, SCENARIO);
+    stdout(&imported(&written(folder.path(), &beside, ROAD), &output, &[]), 0);
+    let scenario: toml::Table = toml::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
+    let points: Vec<_> = scenario["actor"][1]["path"].as_array().unwrap().iter().map(numbers).collect();
+    assert_eq!(points, [[0.0, -5.75], [10.0, -5.75]]);
+    json(&closecall(["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"]), 0);
+    fs::remove_file(&output).unwrap();
+
+    let relative = "<RelativeTargetLaneOffset entityRef=\"Ego\" value=\"0.5\"/>";
+    let shift = with_offset(DYNAMICS, TARGET, "continuous=\"false\"");
+    let second = shift[shift.find("<LateralAction>").unwrap()..shift.find("</LateralAction>").unwrap()].to_owned();
+    let brake = SCENARIO.rfind("<LongitudinalAction>").unwrap();
+    let brake_end = brake + SCENARIO[brake..].find("</LongitudinalAction>").unwrap() + "</LongitudinalAction>".len();
+    let after_change = [&SCENARIO[..brake], second.as_str(), "</LateralAction>", &SCENARIO[brake_end..]].concat();
+    for (wrong, words) in [
+        (
+            with_offset(&DYNAMICS.replace("sinusoidal", "linear"), TARGET, ""),
+            ["`LaneOffsetActionDynamics`", "only cubic"],
+        ),
+        (
+            with_offset("dynamicsShape=\"cubic\"", TARGET, ""),
+            ["`LaneOffsetActionDynamics`", "it needs `maxLateralAcc`"],
+        ),
+        (
+            with_offset(&DYNAMICS.replace("0.3", "0"), TARGET, ""),
+            ["`LaneOffsetActionDynamics`", "is 0; a number above 0"],
+        ),
+        (
+            with_offset(DYNAMICS, &TARGET.replace("0.8", "1.8"), ""),
+            ["`AbsoluteTargetLaneOffset`", "1.8 m beside the centre of the lane; -1.75 to 1.75 m"],
+        ),
+        (
+            with_offset(DYNAMICS, relative, "continuous=\"true\""),
+            ["`LaneOffsetAction`", "follow the offset of another"],
+        ),
+        (after_change, ["`LaneOffsetAction`", "`Slow_Truck` changes lanes before it"]),
+        (beside.replace("offset=\"-0.5\"", "offset=\"-2\""), ["`RelativeLanePosition`", "`offset` leads -2 m beside"]),
+    ] {
+        let refused = imported(&written(folder.path(), &wrong, ROAD), &output, &[]);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{words:?}: {said}");
+        assert!(said.contains("case.xosc:") && words.iter().all(|word| said.contains(word)), "{words:?}: {said}");
+        assert!(!output.exists(), "{words:?}");
+    }
+}
+
+#[test]
+fn an_acceleration_is_checked_where_a_vehicle_of_the_scenario_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // A vehicle starts with its target speed, whatever the rate.
+    let (right, hard) = ("dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"time\"", "value=\"1e9\"");
+    let rate = format!("dynamicsShape=\"linear\" {hard} dynamicsDimension=\"rate\"");
+    assert!(SCENARIO.contains(right));
+    let path = written(folder.path(), &SCENARIO.replacen(right, &rate, 1), ROAD);
+    let said = stdout(&imported(&path, &output, &[]), 0);
+    assert!(said.contains("`Ego` starts with the target speed"), "{said}");
+    fs::remove_file(&output).unwrap();
+    // The controller drives the ego, whatever its actions ask for.
+    let (right, hard) = ("value=\"2\" dynamicsDimension=\"rate\"", "value=\"40\" dynamicsDimension=\"rate\"");
+    assert!(SCENARIO.contains(right));
+    let path = written(folder.path(), &SCENARIO.replacen(right, hard, 1), ROAD);
+    let refused = imported(&path, &output, &[]);
+    assert_eq!(code(&refused), 3);
+    assert!(message(&refused).contains("-40.00 m/s²; -12 to 12 m/s² are possible"), "{}", message(&refused));
+    assert!(!output.exists());
+    stdout(&imported(&path, &output, &["--ego", "Slow_Truck"]), 0);
+    assert!(output.exists());
+}
+
 #[test]
 fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
@@ -814,7 +919,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("hdg=\"0\"", "hdg=\"abc\"", "road.xodr:6: `geometry`: `hdg` is `abc`"),
         ("<geometry s=\"0\"", "<geometry s=\"nan\"", "road.xodr:6: `geometry`: `s` is `nan`"),
         ("max=\"120\"", "max=\"fast\"", "road.xodr:5: `speed`: `max` is `fast`"),
-        ("max=\"120\"", "max=\"-360\"", "`max` is -100 m/s; 0 to 100 m/s"),
+        ("max=\"120\"", "max=\"-360\"", "`max` is -360 km/h; 0 to 100 m/s are needed, or `no limit`"),
         ("unit=\"km/h\"", "unit=\"knots\"", "`unit` is `knots`; one of m/s, km/h, mph"),
         ("a=\"2.5\"", "a=\"nan\"", "`width`: `a` is `nan`"),
         ("id=\"-3\"", "id=\"-3.5\"", "`lane`: `id` is -3.5; a whole number"),
@@ -996,12 +1101,13 @@ fn an_entity_bomb_is_refused_before_it_grows() {
 
 /// The scenarios of others that are imported; all others are refused, each at a line and an
 /// element.
-const IMPORTED: [&str; 9] = [
+const IMPORTED: [&str; 10] = [
     "alks_decelerate",
     "cut-in",
     "highway_driver",
     "slow-lead-vehicle",
     "alks_scenario_4_1_1_free_driving_template",
+    "alks_scenario_4_1_2_swerving_lead_vehicle_template",
     "alks_scenario_4_3_1_follow_lead_vehicle_comfortable_template",
     "alks_scenario_4_3_2_follow_lead_vehicle_emergency_brake_template",
     "alks_scenario_4_4_1_cut_in_no_collision_template",

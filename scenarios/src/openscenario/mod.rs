@@ -5,10 +5,11 @@
 //! ```
 //!
 //! The storyboard is played once with vehicles that follow their actions exactly. The motion of the
-//! other vehicles becomes a prescribed driver: speeds and lane changes at their times. If a trigger
-//! refers to the ego, its time holds for an ego that keeps the speed of the file, as in a nominal
-//! encounter: it is the same for every controller. An element that a scenario cannot express is an
-//! error with file, line and element, or a note; nothing is left out in silence.
+//! other vehicles becomes a prescribed driver: speeds and lane changes at their times, and a lateral
+//! path if a vehicle drives beside the centre of its lane. If a trigger refers to the ego, its time
+//! holds for an ego that keeps the speed of the file, as in a nominal encounter: it is the same for
+//! every controller. An element that a scenario cannot express is an error with file, line and
+//! element, or a note; nothing is left out in silence.
 
 mod condition;
 mod distribution;
@@ -17,6 +18,7 @@ mod entities;
 mod entry_lane;
 mod follow;
 mod formula;
+mod offset;
 mod plane;
 mod reader;
 mod replaced;
@@ -59,9 +61,11 @@ const TIME_GAP_S: f64 = 1.5;
 const LANE_CHANGE_S: [f64; 2] = [1.5, 20.0];
 /// Deviation of a profile from the speeds of the storyboard (m/s).
 const SPEED_TOLERANCE_MPS: f64 = 1e-3;
-/// Time within which a change of speed belongs to the start (s).
+/// Time within which a change of speed belongs to the start (s): an assumption; 0.01 to 0.2 are
+/// plausible.
 const AT_START_S: f64 = 0.05;
-/// Change of speed in one step of the storyboard above which no vehicle follows it (m/s).
+/// Change of speed in one step of the storyboard above which no vehicle follows it (m/s): an
+/// assumption; 0.2 to 1 are plausible.
 const JUMP_MPS: f64 = 0.5;
 /// Friction of the road with a friction scale of 1: the friction of a dry road.
 const DRY_FRICTION: f64 = 0.9;
@@ -538,6 +542,7 @@ fn scenario_text(
         }
         let speed_mps = speeds.first().map_or(start.speed_mps, |(_, mps)| *mps);
         let lane = road.lanes.iter().position(|lane| *lane == start.lane).unwrap_or_default() + 1;
+        let centre_m = -(lane as f64 - 0.5) * road.lane_width_m;
         let mass =
             start.mass_kg.filter(|mass| *mass > 0.0).map(|mass| format!(", mass-kg = {mass:?}")).unwrap_or_default();
         let _ = write!(
@@ -550,6 +555,15 @@ fn scenario_text(
             start.height_m,
             start.s_m + start.centre_m,
         );
+        if index != played.ego
+            && let Some(path) = played.path(index, centre_m)?
+        {
+            let points = path.iter().map(|point| {
+                let [travelled_m, d_m] = point.map(|value| (value * 1e6).round() / 1e6);
+                format!("[{travelled_m:?}, {d_m:?}]")
+            });
+            let _ = writeln!(actors, "path = [{}]", points.collect::<Vec<_>>().join(", "));
+        }
         if index == played.ego {
             let set = if speed_mps > 0.0 { format!(", set-speed-mps = {speed_mps:?}") } else { String::new() };
             let _ = writeln!(

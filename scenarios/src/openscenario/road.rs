@@ -20,7 +20,8 @@ pub(super) const DRIVING: [&str; 8] =
 const LANES: std::ops::RangeInclusive<usize> = 1..=8;
 /// Highest speed limit of a scenario file (m/s).
 const MOST_SPEED_LIMIT_MPS: f64 = 100.0;
-/// The words of the standard for no speed limit.
+/// The words of the standard for no speed limit. Its type `t_maxSpeed` has these words and the numbers
+/// of at least 0: some programs write -1, which has no meaning there.
 const NO_LIMIT: [&str; 2] = ["no limit", "undefined"];
 
 /// The part of a file's road that a scenario can use.
@@ -265,12 +266,17 @@ fn speed_limit(path: &Path, node: &Node) -> Result<Option<f64>, ImportError> {
             return Err(node.error(path, format!("`unit` is `{other}`; one of m/s, km/h, mph is needed")));
         }
     };
-    if node.raw("max").is_none_or(|max| NO_LIMIT.contains(&max)) {
+    if node.raw("max").is_none_or(|max| NO_LIMIT.contains(&max.trim())) {
         return Ok(None);
     }
-    let limit_mps = number(path, node, "max")? * factor;
+    let limit = number(path, node, "max")?;
+    let limit_mps = limit * factor;
     if !(0.0..=MOST_SPEED_LIMIT_MPS).contains(&limit_mps) {
-        let message = format!("`max` is {limit_mps} m/s; 0 to {MOST_SPEED_LIMIT_MPS} m/s, or `no limit`, is needed");
+        let unit = node.raw("unit").unwrap_or("m/s");
+        let message = format!(
+            "`max` is {limit} {unit}; 0 to {MOST_SPEED_LIMIT_MPS} m/s are needed, or `no limit` or `undefined`: the \
+             standard has no number for a road without a limit"
+        );
         return Err(node.error(path, message));
     }
     Ok(Some(limit_mps))
@@ -300,6 +306,31 @@ mod tests {
              </laneSection></lanes></road></OpenDRIVE>"
         );
         read(Path::new("road.xodr"), &text, &UsedRoad::Only).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_words_of_the_standard_are_no_limit_and_a_negative_number_is_refused() {
+        let limit = |attributes: &str| {
+            let node = parse(Path::new("road.xodr"), &format!("<speed {attributes}/>")).unwrap();
+            speed_limit(Path::new("road.xodr"), &node).map_err(|error| error.to_string())
+        };
+        for none in ["max=\"no limit\"", "max=\"undefined\" unit=\"km/h\"", "max=\" no limit \"", "unit=\"mph\""] {
+            assert_eq!(limit(none), Ok(None), "{none}");
+        }
+        assert_eq!(limit("max=\"36\" unit=\"km/h\""), Ok(Some(10.0)));
+        assert_eq!(limit("max=\"0\""), Ok(Some(0.0)));
+        for (wrong, word) in [
+            (
+                "max=\"-1\"",
+                "road.xodr:1: `speed`: `max` is -1 m/s; 0 to 100 m/s are needed, or `no limit` or `undefined`",
+            ),
+            ("max=\"-1\" unit=\"km/h\"", "`max` is -1 km/h; 0 to 100 m/s"),
+            ("max=\"400\" unit=\"km/h\"", "`max` is 400 km/h"),
+            ("max=\"No limit\"", "`max` is `No limit`"),
+        ] {
+            let message = limit(wrong).unwrap_err();
+            assert!(message.contains(word), "{message}");
+        }
     }
 
     #[test]

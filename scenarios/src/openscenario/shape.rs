@@ -211,13 +211,13 @@ impl Checker<'_> {
                 return Err(shape.error(self.path, message));
             }
         }
-        let (curve, end) = match shape.name.as_str() {
+        let (curve, (end, unit)) = match shape.name.as_str() {
             // A curve that turns by up to 60° reaches half its length along the start direction.
-            "poly3" => ([[0.0, 1.0, 0.0, 0.0], self.coefficients(shape, CUBIC)?], 0.5 * length_m),
+            "poly3" => ([[0.0, 1.0, 0.0, 0.0], self.coefficients(shape, CUBIC)?], (0.5 * length_m, " m")),
             "paramPoly3" => {
                 let end = match shape.raw("pRange") {
-                    Some("arcLength") => length_m,
-                    None | Some("normalized") => 1.0,
+                    Some("arcLength") => (length_m, " m"),
+                    None | Some("normalized") => (1.0, ""),
                     Some(other) => {
                         let message = format!("`pRange` is `{other}`; one of arcLength, normalized is needed");
                         return Err(shape.error(self.path, message));
@@ -229,14 +229,25 @@ impl Checker<'_> {
         };
         for x in [0.0, 0.5 * end, end] {
             let [(u_m, u_slope), (v_m, v_slope)] = curve.map(|coefficients| polynomial(coefficients, x));
+            let [u_bend, v_bend] = curve.map(|[_, _, c, d]| 2.0 * c + 6.0 * d * x);
+            if [u_m, v_m, u_slope, v_slope, u_bend, v_bend].iter().any(|value| !value.is_finite()) {
+                let message = format!("its coefficients are too large for a number at p = {x}{unit}");
+                return Err(shape.error(self.path, message));
+            }
             let chord_m = maths::hypot(u_m, v_m);
             if !(chord_m <= length_m + tolerance_m(length_m)) {
                 let message = format!("it leads {chord_m} m away from its start, and its length is {length_m} m");
                 return Err(shape.error(self.path, message));
             }
-            let [u_bend, v_bend] = curve.map(|[_, _, c, d]| 2.0 * c + 6.0 * d * x);
             let speed = maths::hypot(u_slope, v_slope);
-            let curvature_per_m = (u_slope * v_bend - v_slope * u_bend) / (speed * speed * speed);
+            let speed_cubed = speed * speed * speed;
+            if !(speed_cubed > 0.0) {
+                let message = format!(
+                    "its derivatives of U and V are 0 at p = {x}{unit}: it has no direction there, and no curvature"
+                );
+                return Err(shape.error(self.path, message));
+            }
+            let curvature_per_m = (u_slope * v_bend - v_slope * u_bend) / speed_cubed;
             if !(curvature_per_m.abs() <= MOST_CURVATURE_PER_M) {
                 let message = format!(
                     "it has a curvature of {curvature_per_m} 1/m: no vehicle can follow one beyond \
@@ -398,6 +409,17 @@ mod tests {
             ("cV=\"1e-4\"", "cV=\"0.09\"", "m away from its start, and its length is 100 m"),
             ("cV=\"1e-4\" dV=\"0\"", "cV=\"0.4\" dV=\"-0.004\"", "no vehicle can follow one beyond 0.2 1/m"),
             ("arcLength", "arc", "`pRange` is `arc`; one of arcLength, normalized"),
+            (
+                "bU=\"1\"",
+                "bU=\"0\"",
+                "road.xodr:4: `paramPoly3`: its derivatives of U and V are 0 at p = 0 m: it has no",
+            ),
+            (
+                "bU=\"1\" cU=\"0\" dU=\"0\" aV=\"0\" bV=\"0\" cV=\"1e-4\" dV=\"0\" pRange=\"arcLength\"",
+                "bU=\"100\" cU=\"-50\" dU=\"0\" aV=\"0\" bV=\"0\" cV=\"0\" dV=\"0\"",
+                "are 0 at p = 1: it has no direction",
+            ),
+            ("cV=\"1e-4\" dV=\"0\"", "cV=\"1e308\" dV=\"-1e308\"", "too large for a number at p = 0 m"),
             ("b=\"0.03\"", "b=\"3\"", "its slope is 3; -1 to 1 are possible"),
             ("s=\"150\" a=", "s=\"300\" a=", "`s` is 300; 0 to 200 m, the length of the road"),
             ("a=\"0.04\"", "a=\"4\"", "`a` is 4; a superelevation has -1 to 1 rad"),

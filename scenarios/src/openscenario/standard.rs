@@ -65,8 +65,8 @@ enum Kind {
     Number,
     /// A finite number of at least 0.
     AtLeast0,
-    /// A finite number from the first to the second.
-    Within(f64, f64),
+    /// A finite number from the first to the second, in a unit.
+    Within(f64, f64, &'static str),
     /// A whole number.
     Integer,
     /// A whole number of at least 0.
@@ -118,9 +118,12 @@ impl Attribute {
                 number if number >= 0.0 => Ok(number.to_string()),
                 _ => Err(format!("`{name}` is `{value}`; a number of at least 0 is needed")),
             },
-            Kind::Within(low, high) => match number()? {
+            Kind::Within(low, high, unit) => match number()? {
                 number if (low..=high).contains(&number) => Ok(number.to_string()),
-                _ => Err(format!("`{name}` is `{value}`; a number from {low:.5} to {high:.5} is needed")),
+                _ => {
+                    let [low, high] = [low, high].map(|limit| (limit * 1e5).round() / 1e5);
+                    Err(format!("`{name}` is `{value}`; {low} to {high} {unit} are needed, in each version"))
+                }
             },
             Kind::Integer => Ok(whole(f64::from(i32::MIN))?.to_string()),
             Kind::Count => Ok(whole(0.0)?.to_string()),
@@ -205,8 +208,8 @@ const fn at_least_0(name: &'static str) -> Attribute {
     Attribute { name, kind: Kind::AtLeast0 }
 }
 
-const fn within(name: &'static str, low: f64, high: f64) -> Attribute {
-    Attribute { name, kind: Kind::Within(low, high) }
+const fn within(name: &'static str, low: f64, high: f64, unit: &'static str) -> Attribute {
+    Attribute { name, kind: Kind::Within(low, high, unit) }
 }
 
 const fn integer(name: &'static str) -> Attribute {
@@ -263,6 +266,8 @@ const PRECIPITATION_TYPE: [&str; 3] = ["dry", "rain", "snow"];
 const WETNESS: [&str; 5] = ["dry", "moist", "wetWithPuddles", "lowFlooded", "highFlooded"];
 const DYNAMICS_DIMENSION: [&str; 3] = ["distance", "rate", "time"];
 const DYNAMICS_SHAPE: [&str; 4] = ["cubic", "linear", "sinusoidal", "step"];
+/// The shapes whose largest acceleration determines their duration.
+const WITH_ACCELERATION: [&str; 2] = ["cubic", "sinusoidal"];
 const FOLLOWING_MODE: [&str; 2] = ["follow", "position"];
 const SPEED_TARGET_VALUE_TYPE: [&str; 2] = ["delta", "factor"];
 const LONGITUDINAL_DISPLACEMENT: [&str; 3] = ["any", "trailingReferencedEntity", "leadingReferencedEntity"];
@@ -311,7 +316,7 @@ const POSITIONS: [&str; 10] = [
     "TrajectoryPosition",
 ];
 
-static ELEMENTS: [Element; 150] = [
+static ELEMENTS: [Element; 155] = [
     element(
         "OpenSCENARIO",
         &[],
@@ -482,8 +487,8 @@ static ELEMENTS: [Element; 150] = [
         "Weather",
         &[
             word("cloudState", &CLOUD_STATE),
-            within("atmosphericPressure", 80_000.0, 120_000.0),
-            within("temperature", 170.0, 340.0),
+            within("atmosphericPressure", 80_000.0, 120_000.0, "Pa"),
+            within("temperature", 170.0, 340.0, "K"),
             word("fractionalCloudCover", &FRACTIONAL_CLOUD_COVER),
         ],
         &["Sun", "Fog", "Precipitation", "Wind", "DomeImage"],
@@ -491,8 +496,8 @@ static ELEMENTS: [Element; 150] = [
     element(
         "Sun",
         &[
-            within("azimuth", 0.0, 2.0 * PI),
-            within("elevation", -PI, PI),
+            within("azimuth", 0.0, 2.0 * PI, "rad"),
+            within("elevation", -PI, PI, "rad"),
             at_least_0("intensity"),
             at_least_0("illuminance"),
         ],
@@ -508,7 +513,7 @@ static ELEMENTS: [Element; 150] = [
         ],
         &[],
     ),
-    element("Wind", &[within("direction", 0.0, 2.0 * PI), at_least_0("speed")], &[]),
+    element("Wind", &[within("direction", 0.0, 2.0 * PI, "rad"), at_least_0("speed")], &[]),
     element("RoadCondition", &[at_least_0("frictionScaleFactor"), word("wetness", &WETNESS)], &["Properties"]),
     element("LongitudinalAction", &[], &["SpeedAction", "LongitudinalDistanceAction", "SpeedProfileAction"]),
     element("SpeedAction", &[], &["SpeedActionDynamics", "SpeedActionTarget"]),
@@ -558,6 +563,15 @@ static ELEMENTS: [Element; 150] = [
     element("LateralAction", &[], &["LaneChangeAction", "LaneOffsetAction", "LateralDistanceAction"]),
     element("LaneChangeAction", &[number("targetLaneOffset")], &["LaneChangeActionDynamics", "LaneChangeTarget"]),
     element("LaneChangeActionDynamics", &TRANSITION_DYNAMICS, &[]),
+    element("LaneOffsetAction", &[boolean("continuous")], &["LaneOffsetActionDynamics", "LaneOffsetTarget"]),
+    element(
+        "LaneOffsetActionDynamics",
+        &[some("dynamicsShape", &DYNAMICS_SHAPE, &WITH_ACCELERATION), at_least_0("maxLateralAcc")],
+        &[],
+    ),
+    element("LaneOffsetTarget", &[], &["RelativeTargetLaneOffset", "AbsoluteTargetLaneOffset"]),
+    element("AbsoluteTargetLaneOffset", &[number("value")], &[]),
+    element("RelativeTargetLaneOffset", &[text("entityRef"), number("value")], &[]),
     element("LaneChangeTarget", &[], &["RelativeTargetLane", "AbsoluteTargetLane"]),
     element("AbsoluteTargetLane", &[integer("value")], &[]),
     element("RelativeTargetLane", &[text("entityRef"), integer("value")], &[]),
@@ -831,8 +845,11 @@ mod tests {
             ("Condition", "delay", "$late", "at least 0"),
             ("Condition", "delay", "NaN", "a number is needed"),
             ("LanePosition", "laneId", "-1.5", "whole number"),
-            ("Weather", "temperature", "20", "a number from 170.00000 to 340.00000"),
-            ("Sun", "elevation", "-4", "-3.14159 to 3.14159"),
+            // Degrees Celsius, degrees and hectopascals, where the standard has other units.
+            ("Weather", "temperature", "20", "170 to 340 K are needed, in each version"),
+            ("Sun", "elevation", "-4", "-3.14159 to 3.14159 rad"),
+            ("Sun", "azimuth", "180", "0 to 6.28319 rad"),
+            ("Weather", "atmosphericPressure", "1013", "80000 to 120000 Pa"),
             ("Sun", "azimuth", "NaN", "a number is needed"),
             ("FrontAxle", "maxSteering", "-0.5", "at least 0"),
             ("Event", "maximumExecutionCount", "2", "must be 1"),

@@ -38,8 +38,8 @@ const MOST_EXPECTED: f64 = 1e6;
 /// Distance from the expected value at which a Poisson distribution ends (standard deviations, and
 /// numbers beside). The probability beyond is below 10⁻¹⁶.
 const POISSON_END: f64 = 40.0;
-/// Largest whole number that a double-precision number has with all below.
-const MOST_WHOLE: f64 = 9_007_199_254_740_992.0;
+/// Largest double-precision number below 2⁶⁴, the number of seeds.
+const MOST_WHOLE: f64 = 18_446_744_073_709_549_568.0;
 
 /// The distributions of a file.
 #[derive(Clone, Debug)]
@@ -223,7 +223,8 @@ pub(super) fn read(reader: &Reader, node: &Node) -> Result<Stochastic, ImportErr
 fn whole(reader: &Reader, node: &Node, name: &str, least: f64) -> Result<u64, ImportError> {
     let value = reader.number(node, name)?;
     if !(least..=MOST_WHOLE).contains(&value) || value.fract() != 0.0 {
-        return Err(reader.error(node, format!("`{name}` is {value}; a whole number from {least} is needed")));
+        let message = format!("`{name}` is {value}; a whole number from {least} and below 2^64 is needed");
+        return Err(reader.error(node, message));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number in the range above")]
     let value = value as u64;
@@ -556,6 +557,8 @@ mod tests {
             ("", &one[..], "it needs `numberOfTestRuns`"),
             ("numberOfTestRuns=\"0\"", &one[..], "`numberOfTestRuns` is 0; a whole number from 1"),
             ("numberOfTestRuns=\"1\" randomSeed=\"0.5\"", &one[..], "`randomSeed` is 0.5"),
+            ("numberOfTestRuns=\"1\" randomSeed=\"-1\"", &one[..], "`randomSeed` is -1; a whole number from 0"),
+            ("numberOfTestRuns=\"1\" randomSeed=\"2e19\"", &one[..], "below 2^64 is needed"),
             ("numberOfTestRuns=\"1\"", &one[..0], "it needs a `StochasticDistribution`"),
             ("numberOfTestRuns=\"1\"", &[one[0], one[0]][..], "`a` has a distribution already"),
         ] {
@@ -574,5 +577,12 @@ mod tests {
         assert_ne!(first.draw(1), first.draw(2));
         assert_ne!(first.draw(1), second.draw(1));
         assert_ne!(first.draw(1)["a"], first.draw(1)["b"]);
+        // The standard has a double-precision number as seed: other forms of 1, and large seeds.
+        for same in ["1.0", "1e0", "10E-1", "+1"] {
+            assert_eq!(first.draw(2), of(same).draw(2), "{same}");
+        }
+        assert_eq!(of("1.5e3").seed, Some(1_500));
+        assert_eq!(of("12345678901234568").seed, Some(12_345_678_901_234_568));
+        assert_eq!(of("18446744073709549568").seed, Some(18_446_744_073_709_549_568));
     }
 }

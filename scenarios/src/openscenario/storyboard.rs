@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
 use super::follow::Following;
+use super::offset::Shift;
 use super::plane::nearest;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
@@ -18,16 +19,18 @@ use super::world::Vehicle;
 
 /// Step of the storyboard (s): the step of esmini's tests.
 pub(super) const STEP_S: f64 = 0.01;
-/// Longest storyboard without a stop trigger that fires (s).
+/// Longest storyboard without a stop trigger that fires (s): an assumption; 100 to 1000 are plausible.
 pub(super) const LONGEST_S: f64 = 300.0;
-/// Time that is played after the last action ended (s), if no trigger stops the storyboard.
+/// Time that is played after the last action ended (s), if no trigger stops the storyboard: an
+/// assumption; 5 to 60 are plausible.
 const AFTER_LAST_S: f64 = 20.0;
 
 /// Highest speed of a scenario file (m/s).
 pub(super) const MOST_SPEED_MPS: f64 = 100.0;
 
 /// Largest acceleration of an action, forwards or backwards (m/s²): no tyre transmits more, as for
-/// recorded values. A `step` sets a speed at once.
+/// recorded values. A `step` sets a speed at once. It limits the vehicles that the scenario drives:
+/// the controller drives the ego, whatever its actions ask for.
 const MOST_ACCELERATION_MPS2: f64 = 12.0;
 
 /// Largest angle between a vehicle and the road at its start (rad): an assumption; 0.02 to 0.2 are
@@ -82,6 +85,8 @@ enum Running {
     Meet { vehicle: usize, points: Vec<(f64, f64)>, meeting: Meeting },
     /// A gap to another vehicle, for ever.
     Follow(Following),
+    /// A shift within the lane.
+    Offset(Shift),
     /// A lane change, until its end.
     Lane { ends_s: f64 },
     /// A lane that a vehicle on a trajectory has from a time.
@@ -95,6 +100,8 @@ struct RunningEvent {
     /// The number of its manoeuvre in the document. Two acts may have manoeuvres of one name.
     maneuver: usize,
     is_longitudinal: Vec<usize>,
+    /// The vehicles that it moves sideways.
+    is_lateral: Vec<usize>,
     /// The names of its actions. Each ends with the event.
     names: Vec<String>,
     actions: Vec<Running>,
@@ -115,6 +122,9 @@ pub(super) struct Storyboard<'a> {
     done: BTreeSet<usize>,
     /// Time and speed of each vehicle in each step.
     pub(super) speeds: Vec<Vec<(f64, f64)>>,
+    /// Distance since the start and offset from the centre of the lane of each vehicle in each step (m).
+    pub(super) offsets: Vec<Vec<[f64; 2]>>,
+    pub(super) shifts: Vec<Shift>,
     pub(super) lane_changes: Vec<LaneChange>,
     /// The vehicles that follow another.
     pub(super) following: Vec<Following>,
@@ -129,7 +139,8 @@ pub(super) struct Storyboard<'a> {
 
 impl<'a> Storyboard<'a> {
     pub(super) fn new(reader: Reader, road: &'a ImportedRoad, vehicles: Vec<Vehicle>, ego: usize) -> Self {
-        let (speeds, moves) = (vec![Vec::new(); vehicles.len()], vec![0; vehicles.len()]);
+        let (speeds, offsets) = (vec![Vec::new(); vehicles.len()], vec![Vec::new(); vehicles.len()]);
+        let moves = vec![0; vehicles.len()];
         Self {
             reader,
             road,
@@ -142,6 +153,8 @@ impl<'a> Storyboard<'a> {
             running: Vec::new(),
             done: BTreeSet::new(),
             speeds,
+            offsets,
+            shifts: Vec::new(),
             lane_changes: Vec::new(),
             following: Vec::new(),
             moves,
@@ -177,6 +190,7 @@ impl<'a> Storyboard<'a> {
             }
             for (index, vehicle) in self.vehicles.iter().enumerate() {
                 self.speeds[index].push((self.time_s, vehicle.speed_mps));
+                self.offsets[index].push([vehicle.travelled_m, vehicle.offset_m]);
             }
             let stop = storyboard.child("StopTrigger").filter(|trigger| !trigger.children.is_empty());
             let stops = stop.is_some() && self.is_triggered(stop)?;
@@ -312,6 +326,7 @@ impl<'a> Storyboard<'a> {
             name: name.to_owned(),
             maneuver,
             is_longitudinal: Vec::new(),
+            is_lateral: Vec::new(),
             names: Vec::new(),
             actions: Vec::new(),
         };
@@ -330,8 +345,8 @@ impl<'a> Storyboard<'a> {
                 self.action(self.reader.only(inner)?.clone(), actor, &mut running)?;
             }
         }
-        // A new change of speed ends the one before.
-        let replaced = running.is_longitudinal.clone();
+        // A new change of speed ends the one before, and a new motion sideways a shift.
+        let (replaced, turned) = (running.is_longitudinal.clone(), running.is_lateral.clone());
         for other in &mut self.running {
             other.actions.retain(|action| match action {
                 Running::Speed { vehicle, .. }
@@ -339,6 +354,7 @@ impl<'a> Storyboard<'a> {
                 | Running::Profile { vehicle, .. }
                 | Running::Meet { vehicle, .. }
                 | Running::Follow(Following { vehicle, .. }) => !replaced.contains(vehicle),
+                Running::Offset(shift) => !turned.contains(&shift.vehicle),
                 Running::Lane { .. } | Running::LaneFrom { .. } => true,
             });
         }
@@ -378,9 +394,16 @@ impl<'a> Storyboard<'a> {
                 let inner = self.reader.only(&node)?.clone();
                 match inner.name.as_str() {
                     "LaneChangeAction" => self.lane_change(&inner, actor, running),
-                    _ => Err(self
-                        .reader
-                        .error(&inner, "only `LaneChangeAction` is read: a vehicle keeps the centre of its lane")),
+                    "LaneOffsetAction" => {
+                        let shift = self.lane_offset(&inner, actor)?;
+                        self.shifts.push(shift);
+                        running.is_lateral.push(actor);
+                        if shift.runs(self.time_s) {
+                            running.actions.push(Running::Offset(shift));
+                        }
+                        Ok(())
+                    }
+                    _ => Err(self.reader.error(&inner, "only `LaneChangeAction` and `LaneOffsetAction` are read")),
                 }
             }
             "RoutingAction" => {
@@ -441,7 +464,7 @@ impl<'a> Storyboard<'a> {
         let to_mps = self.possible(node, to_mps)?;
         let from_mps = self.vehicles[actor].speed_mps;
         let (duration_s, is_smooth) = self.transition(dynamics, (from_mps, to_mps), 0.5 * (from_mps + to_mps))?;
-        if duration_s > 0.0 {
+        if duration_s > 0.0 && actor != self.ego {
             // A smooth change of speed has a higher acceleration in its middle.
             let steepness = if is_smooth { 1.5 } else { 1.0 };
             self.check_acceleration(dynamics, steepness * (to_mps - from_mps) / duration_s)?;
@@ -460,21 +483,15 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    /// Checks the value of a transition between speeds, also if the speed does not change by it.
+    /// Checks the time or the distance of a transition between speeds, also if the speed does not
+    /// change by it. A rate is checked where a vehicle accelerates by it.
     fn check_dynamics(&self, node: &Node) -> Result<(), ImportError> {
         if node.raw("dynamicsShape") == Some("step") {
             return Ok(());
         }
         let value = self.reader.number(node, "value")?;
-        let is_rate = node.raw("dynamicsDimension") == Some("rate");
-        let is_possible = if is_rate { value.abs() <= MOST_ACCELERATION_MPS2 } else { value >= 0.0 };
-        match is_possible {
+        match value >= 0.0 || node.raw("dynamicsDimension") == Some("rate") {
             true => Ok(()),
-            false if is_rate => {
-                let limit = MOST_ACCELERATION_MPS2;
-                let message = format!("`value` is {value}; a rate of -{limit} to {limit} m/s² is possible");
-                Err(self.reader.error(node, message))
-            }
             false => Err(self.reader.error(node, format!("`value` is {value}; a number of at least 0 is needed"))),
         }
     }
@@ -546,7 +563,7 @@ impl<'a> Storyboard<'a> {
             }
             at_s += duration_s;
             let speed_mps = self.possible(entry, self.reader.number(entry, "speed")?)?;
-            if let Some((_, before_mps)) = points.last().filter(|_| duration_s > 0.0) {
+            if let Some((_, before_mps)) = points.last().filter(|_| duration_s > 0.0 && actor != self.ego) {
                 self.check_acceleration(entry, (speed_mps - before_mps) / duration_s)?;
             }
             points.push((at_s, speed_mps));
@@ -557,6 +574,13 @@ impl<'a> Storyboard<'a> {
     }
 
     fn follow_trajectory(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
+        if self.vehicles[actor].offset_m != 0.0 {
+            let message = format!(
+                "`{}` is beside the centre of its lane: a trajectory begins at the centre, and keeps it",
+                self.vehicles[actor].name
+            );
+            return Err(self.reader.error(node, message));
+        }
         let mut driven = self.trajectory(node, actor)?;
         if let Some(first) = driven.speeds.first_mut() {
             first.0 = first.0.min(self.time_s);
@@ -571,6 +595,7 @@ impl<'a> Storyboard<'a> {
         }
         self.lane_changes.extend(driven.lane_changes);
         running.is_longitudinal.push(actor);
+        running.is_lateral.push(actor);
         running.actions.push(Running::Profile { vehicle: actor, points: driven.speeds });
         Ok(())
     }
@@ -597,6 +622,10 @@ impl<'a> Storyboard<'a> {
             let message = format!("lane {to} is no driving lane along the road, only {}", lanes.join(", "));
             return Err(self.reader.error(target, message));
         };
+        if from_index == to_index && self.vehicles[actor].offset_m != 0.0 {
+            let message = "it leads back to the centre of the lane: a `LaneOffsetAction` with the offset 0 is needed";
+            return Err(self.reader.error(node, message));
+        }
         if from_index == to_index {
             return Ok(());
         }
@@ -609,7 +638,8 @@ impl<'a> Storyboard<'a> {
         let (duration_s, _) =
             self.transition(dynamics, (0.0, self.road.lane_width_m), self.vehicles[actor].speed_mps)?;
         let at_s = self.time_s;
-        self.vehicles[actor].lane = to;
+        (self.vehicles[actor].lane, self.vehicles[actor].offset_m) = (to, 0.0);
+        running.is_lateral.push(actor);
         let (line, element) = (node.line, "LaneChangeAction");
         self.lane_changes.push(LaneChange { vehicle: actor, at_s, from, to, duration_s, line, element });
         running.actions.push(Running::Lane { ends_s: at_s + duration_s });
@@ -635,7 +665,7 @@ impl<'a> Storyboard<'a> {
         self.time_s = ((self.time_s + STEP_S) / STEP_S).round() * STEP_S;
         let before: Vec<f64> = self.vehicles.iter().map(|vehicle| vehicle.speed_mps).collect();
         let (time_s, vehicles) = (self.time_s, &self.vehicles);
-        let (mut set, mut lanes) = (Vec::new(), Vec::new());
+        let (mut set, mut lanes, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for event in &mut self.running {
             event.actions.retain(|action| match action {
                 Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, is_smooth } => {
@@ -662,6 +692,10 @@ impl<'a> Storyboard<'a> {
                     set.push((following.vehicle, following.next_speed_mps(vehicles)));
                     true
                 }
+                Running::Offset(shift) => {
+                    offsets.push((shift.vehicle, shift.offset_m(time_s)));
+                    shift.runs(time_s)
+                }
                 Running::Lane { ends_s } => time_s < *ends_s - 1e-9,
                 Running::LaneFrom { vehicle, at_s, lane } => {
                     let is_later = time_s < *at_s;
@@ -674,6 +708,9 @@ impl<'a> Storyboard<'a> {
         }
         for (vehicle, lane) in lanes {
             self.vehicles[vehicle].lane = lane;
+        }
+        for (vehicle, offset_m) in offsets {
+            self.vehicles[vehicle].offset_m = offset_m;
         }
         for (vehicle, speed_mps) in set {
             self.vehicles[vehicle].speed_mps = speed_mps.max(0.0);
@@ -872,9 +909,11 @@ impl<'a> Storyboard<'a> {
 
     fn place(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
         let reader = self.reader.clone();
-        if reader.number_or(node, "offset", 0.0)? != 0.0 {
-            return Err(reader.error(node, "`offset` must be 0: a vehicle starts at the centre of its lane"));
+        let offset_m = reader.number_or(node, "offset", 0.0)?;
+        if offset_m != 0.0 && vehicle == self.ego {
+            return Err(reader.error(node, "`offset` must be 0: the ego starts at the centre of its lane"));
         }
+        self.check_offset(node, "offset", offset_m)?;
         if let Some(orientation) = node.child("Orientation") {
             let heading_rad = reader.number_or(orientation, "h", 0.0)?;
             if !(heading_rad.abs() < 1e-3) {
@@ -928,7 +967,7 @@ impl<'a> Storyboard<'a> {
         }
         let placed = &mut self.vehicles[vehicle];
         placed.start = (node.line, node.name.clone());
-        (placed.s_m, placed.lane, placed.is_placed) = (s_m, lane, true);
+        (placed.s_m, placed.lane, placed.is_placed, placed.offset_m) = (s_m, lane, true, offset_m);
         Ok(())
     }
 }

@@ -60,8 +60,34 @@ impl Approach {
     /// Returns the speeds at times from now, linear in between.
     ///
     /// # Errors
-    /// The message, if no vehicle of a scenario has these speeds.
+    /// The message, if no prescribed driver accelerates like this, or no vehicle has these speeds.
     fn speeds(&self) -> Result<Vec<(f64, f64)>, String> {
+        let points = self.course()?;
+        let [hardest_mps2, largest_mps2] = ACCELERATION_MPS2;
+        for pair in points.windows(2) {
+            let acceleration_mps2 = (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0);
+            if !(hardest_mps2 - SAME..=largest_mps2 + SAME).contains(&acceleration_mps2) {
+                return Err(format!(
+                    "{}, an acceleration of {acceleration_mps2:.2} m/s² is needed; {hardest_mps2} to {largest_mps2} m/s² \
+                     are possible",
+                    self.arrival()
+                ));
+            }
+        }
+        Ok(points)
+    }
+
+    /// Returns what the vehicle has to do, for a message.
+    fn arrival(&self) -> String {
+        let Self { way_m, duration_s, from_mps, .. } = self;
+        format!("to come {way_m:.2} m in {duration_s:.2} s from {from_mps:.2} m/s")
+    }
+
+    /// Returns the speeds at times from now, linear in between, whatever accelerations they need.
+    ///
+    /// # Errors
+    /// The message, if no vehicle of a scenario has these speeds.
+    fn course(&self) -> Result<Vec<(f64, f64)>, String> {
         let Self { way_m, duration_s, from_mps, end } = *self;
         let points = match end {
             None => vec![(0.0, from_mps), (duration_s, 2.0 * way_m / duration_s - from_mps)],
@@ -80,21 +106,11 @@ impl Approach {
                 points
             }
         };
-        let arrival = format!("to come {way_m:.2} m in {duration_s:.2} s from {from_mps:.2} m/s");
         for (_, speed_mps) in &points {
             if !(-SAME..=MOST_SPEED_MPS).contains(speed_mps) {
                 return Err(format!(
-                    "{arrival}, a speed of {speed_mps:.2} m/s is needed; 0 to {MOST_SPEED_MPS} m/s are possible"
-                ));
-            }
-        }
-        let [hardest_mps2, largest_mps2] = ACCELERATION_MPS2;
-        for pair in points.windows(2) {
-            let acceleration_mps2 = (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0);
-            if !(hardest_mps2 - SAME..=largest_mps2 + SAME).contains(&acceleration_mps2) {
-                return Err(format!(
-                    "{arrival}, an acceleration of {acceleration_mps2:.2} m/s² is needed; {hardest_mps2} to {largest_mps2} \
-                     m/s² are possible"
+                    "{}, a speed of {speed_mps:.2} m/s is needed; 0 to {MOST_SPEED_MPS} m/s are possible",
+                    self.arrival()
                 ));
             }
         }
@@ -128,7 +144,9 @@ impl Storyboard<'_> {
         };
         let from_mps = self.vehicles[actor].speed_mps;
         let approach = Approach { way_m, duration_s, from_mps, end };
-        let speeds = approach.speeds().map_err(|message| self.reader.error(node, message))?;
+        // The controller drives the ego, whatever its action asks for.
+        let speeds = if actor == self.ego { approach.course() } else { approach.speeds() };
+        let speeds = speeds.map_err(|message| self.reader.error(node, message))?;
         let speeds: Vec<_> = speeds.into_iter().map(|(after_s, mps)| (self.time_s + after_s, mps)).collect();
         let at_s = self.time_s + duration_s;
         let last_mps = speeds.last().map_or(from_mps, |(_, mps)| *mps);
@@ -269,6 +287,8 @@ mod tests {
         assert!(approach(20.0, 4.0, None).contains("a speed of -10.00 m/s is needed"));
         assert!(approach(1_000.0, 10.0, None).contains("a speed of 180.00 m/s is needed"));
         assert!(approach(100.0, 2.0, None).contains("an acceleration of 30.00 m/s² is needed; -9 to 5 m/s²"));
+        let hard = Approach { way_m: 100.0, duration_s: 2.0, from_mps: 20.0, end: None };
+        assert_eq!(hard.course().unwrap(), [(0.0, 20.0), (2.0, 80.0)], "for a vehicle that is not driven by it");
         let steady = Some(FinalSpeed { speed_mps: 20.0, steady_s: 4.0 });
         assert!(approach(80.0, 4.0, steady).contains("shorter than the 4.00 s"));
         let stands = Some(FinalSpeed { speed_mps: 0.0, steady_s: 0.0 });

@@ -17,7 +17,7 @@ use super::storyboard::{LaneChange, MOST_SPEED_MPS, STEP_S, Storyboard};
 /// quintic path 10 x³ − 15 x⁴ + 6 x⁵.
 const MIDDLE_SHARE: f64 = 0.506_72;
 /// Share of the way between two lanes at which a lane change is taken to have begun; its complement
-/// is the end.
+/// is the end. An assumption; 0.05 to 0.2 are plausible.
 const BEGUN: f64 = 0.1;
 /// Largest distance along the road between a vehicle and the beginning of its trajectory (m): an
 /// assumption; 0.1 to 2 are plausible.

@@ -20,6 +20,8 @@ pub(super) struct Vehicle {
     pub(super) s_m: f64,
     /// Lane of OpenDRIVE; the target lane while the vehicle changes lanes.
     pub(super) lane: i32,
+    /// From the centre of the lane, positive to the left (m).
+    pub(super) offset_m: f64,
     pub(super) speed_mps: f64,
     pub(super) acceleration_mps2: f64,
     pub(super) travelled_m: f64,
