@@ -67,8 +67,8 @@ const RECORDED: u64 = 1;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall traffic chain traffic.csv -o chain",
-    "closecall traffic chain one.csv two.csv -o chain -n 200 --seed 7",
-    "closecall traffic chain traffic.csv -o chain --encounters 20 --gate 'upper(induced) <= 0.05'",
+    "closecall traffic chain one.csv two.csv -o both -n 200 --seed 7",
+    "closecall traffic chain traffic.csv -o twenty --encounters 20 --gate 'upper(induced) <= 0.05'",
 ]))]
 pub(super) struct ChainArgs {
     #[command(flatten)]
