@@ -81,4 +81,7 @@ pub struct Resume<'a> {
     pub retries_errors: bool,
     /// The folder to which its results have been moved; `None` if they are where they were.
     pub moved_to: Option<&'a str>,
+    /// The folder to which the paths of the command are relative; `None` if it is the folder in
+    /// which the user is.
+    pub working_folder: Option<&'a str>,
 }

@@ -103,7 +103,12 @@ impl EndedEarly<'_> {
     fn resume(&self) -> Option<String> {
         let retries_errors = matches!(self.ending, Some(EarlyEnd::Errors { .. }));
         let Kept { command, .. } = self.kept.as_ref()?;
-        Some((self.command_for)(&Action::Resume(Resume { command, retries_errors, moved_to: None })))
+        Some((self.command_for)(&Action::Resume(Resume {
+            command,
+            retries_errors,
+            moved_to: None,
+            working_folder: None,
+        })))
     }
 
     /// Returns the end as JSON.

@@ -240,6 +240,15 @@ impl Folder {
         self.path.join(name)
     }
 
+    /// Returns the folder of the campaign to which the samples in this folder belong, if they are
+    /// its fast samples.
+    pub fn campaign_of_fast_samples(&self) -> Option<PathBuf> {
+        let path = std::path::absolute(&self.path).ok()?;
+        let campaign = path.parent()?;
+        let is_fast = path.file_name()? == FAST_SAMPLES && campaign.join(MANIFEST).is_file();
+        is_fast.then(|| campaign.to_owned())
+    }
+
     /// Reads the manifest, which says how the campaign was made.
     ///
     /// # Errors

@@ -8,8 +8,13 @@
 //! | `journal.jsonl` | a record of another sample, another order | a new campaign |
 //! | files made from the journal | missing | `--resume` |
 //!
+//! Fast samples, in [`FAST_SAMPLES`](crate::folder::FAST_SAMPLES), have no files that are made from
+//! their journal. The campaign to which they belong resumes them.
+//!
 //! The command that resumes a campaign stands in its manifest. It is shown only if the folder is the
-//! user's own (see the module `trust`): another author may have written any command there.
+//! user's own (see the module `trust`): another author may have written any command there. If the
+//! command ran in another folder than the user is in, it has to run there again, because its paths
+//! may be relative.
 //!
 //! The commands that read a folder make the same checks of its records: see
 //! [`Folder::records`](crate::folder::Folder::records).
@@ -78,7 +83,8 @@ impl Integrity {
             return integrity;
         }
         let is_paired = manifest.arms.len() > 1;
-        for file in DERIVED_FILES {
+        let derived: &[&str] = if folder.campaign_of_fast_samples().is_some() { &[] } else { &DERIVED_FILES };
+        for &file in derived {
             if integrity.missing == 0 && !folder.file(file).is_file() && (is_paired || file != "arm_pairs.parquet") {
                 integrity.add_resumable(file, None, "it is missing".to_owned());
             }
@@ -141,12 +147,26 @@ impl Integrity {
 }
 
 /// Returns the words that say how the campaign is resumed in this folder, which may have been moved.
+/// Fast samples are resumed with the campaign to which they belong.
 fn resumption(folder: &Folder, manifest: &Manifest, command_for: CommandFor) -> String {
-    let path = folder.path().display().to_string();
+    let path = folder.campaign_of_fast_samples().unwrap_or_else(|| folder.path().to_owned());
     if folder.is_own().is_ok_and(|is_own| is_own) {
-        let resumed = Resume { command: &manifest.command, retries_errors: false, moved_to: Some(&path) };
+        let here = std::env::current_dir().ok();
+        let elsewhere = manifest.controller_folder().filter(|ran_in| here.as_deref() != Some(*ran_in));
+        let path = match elsewhere {
+            Some(_) => std::path::absolute(&path).unwrap_or(path),
+            None => path,
+        };
+        let (path, elsewhere) = (path.display().to_string(), elsewhere.map(|folder| folder.display().to_string()));
+        let resumed = Resume {
+            command: &manifest.command,
+            retries_errors: false,
+            moved_to: Some(&path),
+            working_folder: elsewhere.as_deref(),
+        };
         return format!("resume the campaign: {}", command_for(&Action::Resume(resumed)));
     }
+    let path = path.display().to_string();
     format!(
         "resume the campaign with your own command line, if you trust the folder: {}; another user or another machine has \
          written the folder, so the `command` of its {MANIFEST} is not repeated here",

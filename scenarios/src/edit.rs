@@ -53,6 +53,15 @@ pub enum SettingError {
         /// The keys that exist there.
         names: String,
     },
+    /// Two settings name the same element of a list, by its id and by its index, and contradict each
+    /// other.
+    #[error("`{first}` and `{second}` contradict each other: give one of them")]
+    Contradiction {
+        /// The earlier setting.
+        first: String,
+        /// The later setting.
+        second: String,
+    },
 }
 
 impl fmt::Display for Setting {
@@ -87,6 +96,45 @@ impl Setting {
             let earlier = settings[..index].iter().find(|earlier| later.undoes(earlier))?;
             Some([earlier, later])
         })
+    }
+
+    /// Checks that no two settings contradict each other in this document alone, in which an id and an
+    /// index name the same element of a list (`actor.rear.…`, `actor.2.…`). Settings that contradict
+    /// each other in any document are the caller's: see [`Self::contradiction`].
+    ///
+    /// # Errors
+    /// [`SettingError::Contradiction`] with the first two settings.
+    pub(super) fn check_together(settings: &[Self], document: &DocumentMut) -> Result<(), SettingError> {
+        let by_index: Vec<Self> = settings.iter().map(|setting| setting.by_index(document)).collect();
+        for (index, later) in settings.iter().enumerate() {
+            for (earlier, same) in settings[..index].iter().zip(&by_index) {
+                if by_index[index].undoes(same) && !later.undoes(earlier) {
+                    return Err(SettingError::Contradiction { first: earlier.to_string(), second: later.to_string() });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the setting with the index of each element of a list that it names by its id.
+    fn by_index(&self, document: &DocumentMut) -> Self {
+        let mut key = self.key.clone();
+        let mut table: Option<&dyn TableLike> = Some(document.as_table());
+        let mut parts = key.iter_mut();
+        while let (Some(parent), Some(part)) = (table, parts.next()) {
+            table = match parent.get(part.as_str()) {
+                Some(Item::ArrayOfTables(elements)) => {
+                    let Some(name) = parts.next() else { break };
+                    let index = index_of(elements, name);
+                    if let Some(index) = index {
+                        *name = index.to_string();
+                    }
+                    index.and_then(|index| elements.get(index)).map(|element| element as &dyn TableLike)
+                }
+                item => item.and_then(Item::as_table_like),
+            };
+        }
+        Self { key, value: self.value.clone() }
     }
 
     /// Returns true if nothing is left of an `earlier` setting after this one: it has the same key
@@ -192,7 +240,7 @@ impl Setting {
             self.no_such_key(&part, format!("`{array}` with a name and a key: {}", ids.join(", ")))
         };
         let name = name.ok_or_else(not_found)?;
-        let index = ids.iter().position(|id| id == name).or_else(|| name.parse().ok()).ok_or_else(not_found)?;
+        let index = index_of(tables, name).ok_or_else(not_found)?;
         match tables.get_mut(index) {
             Some(table) => Ok(table),
             None => Err(not_found()),
@@ -207,6 +255,12 @@ impl Setting {
     fn value(&self) -> Value {
         Value::from_str(&self.value).unwrap_or_else(|_| Value::String(Formatted::new(self.value.clone())))
     }
+}
+
+/// Returns the index of the element that a part of a key names, by its id or by its index.
+fn index_of(elements: &ArrayOfTables, name: &str) -> Option<usize> {
+    let mut ids = elements.iter().map(|element| element.get("id").and_then(Item::as_str));
+    ids.position(|id| id == Some(name)).or_else(|| name.parse().ok())
 }
 
 /// Returns true if both values mean the same: numbers are compared as numbers (`6` and `6.0`).
@@ -284,6 +338,35 @@ mod tests {
             ["aeb.trigger-mps2=5", "acc:aeb.trigger-mps2=6"],
         ] {
             assert_eq!(found(&texts), None, "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn an_id_and_an_index_of_the_same_actor_are_found_in_the_document() {
+        let text = format!("{TEXT}[[actor]]\nid = 'front'\nstart = {{ behind = {{ gap-m = 60 }} }}\n");
+        let document: DocumentMut = text.parse().unwrap();
+        let checked = |texts: [&str; 2]| {
+            Setting::check_together(&texts.map(|text| text.parse::<Setting>().unwrap()), &document)
+                .map_err(|error| error.to_string())
+        };
+        for texts in [
+            ["actor.rear.start.behind.gap-m=90", "actor.0.start.behind.gap-m=120"],
+            ["actor.1.start.behind.gap-m=90", "actor.front.start.behind.gap-m=120"],
+            ["actor.1.start.behind.gap-m=90", "actor.front.start={behind={gap-m=120}}"],
+        ] {
+            let [first, second] = texts;
+            let said = format!("`{first}` and `{second}` contradict each other: give one of them");
+            assert_eq!(checked(texts), Err(said));
+        }
+        for texts in [
+            ["actor.rear.start.behind.gap-m=90", "actor.1.start.behind.gap-m=120"],
+            ["actor.rear.start.behind.gap-m=90", "actor.0.start.behind.gap-m=90.0"],
+            ["actor.rear.start={behind={gap-m=120}}", "actor.0.start.behind.gap-m=90"],
+            ["actor.7.start.behind.gap-m=90", "actor.nobody.start.behind.gap-m=120"],
+            // What the caller finds without the document.
+            ["actor.rear.start.behind.gap-m=90", "actor.rear.start.behind.gap-m=120"],
+        ] {
+            assert_eq!(checked(texts), Ok(()), "{texts:?}");
         }
     }
 

@@ -491,8 +491,10 @@ fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, Scenar
         line: locate::line_at(text, error.span().map_or(0, |span| span.start)),
         message: error.message().to_owned(),
     })?;
+    let in_set = |source| ScenarioError::Set { path: path.to_owned(), source };
+    Setting::check_together(settings, &document).map_err(in_set)?;
     for setting in settings {
-        setting.apply(&mut document).map_err(|source| ScenarioError::Set { path: path.to_owned(), source })?;
+        setting.apply(&mut document).map_err(in_set)?;
     }
     Ok(document.to_string())
 }

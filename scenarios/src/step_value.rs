@@ -54,7 +54,7 @@ impl Variation {
             return Err(format!("{steps} steps are not possible: 2 to {MAX_STEPS} are allowed"));
         }
         if !(from.is_finite() && to.is_finite() && from != to) {
-            return Err(format!("from {from} to {to} is no variation: two different numbers are needed"));
+            return Err(format!("from {from} to {to} is no variation: two different finite numbers are needed"));
         }
         let value = |step: usize| from + (to - from) * step as f64 / (steps - 1) as f64;
         let values = (0..steps).map(|step| (value(step) * STEPS_PER_UNIT).round() / STEPS_PER_UNIT).collect();
@@ -122,8 +122,15 @@ mod tests {
 
     #[test]
     fn a_variation_needs_two_values_and_two_steps() {
-        for (values, steps) in [([1.0, 1.0], 5), ([f64::NAN, 1.0], 5), ([1.0, 2.0], 1), ([1.0, 2.0], 101)] {
-            assert!(Variation::new("cc1", values, steps).is_err(), "{values:?} {steps}");
+        for (values, steps, said) in [
+            ([1.0, 1.0], 5, "two different finite numbers are needed"),
+            ([f64::NAN, 1.0], 5, "two different finite numbers"),
+            ([1.0, f64::INFINITY], 5, "two different finite numbers"),
+            ([1.0, 2.0], 1, "2 to 100 are allowed"),
+            ([1.0, 2.0], 101, "2 to 100 are allowed"),
+        ] {
+            let error = Variation::new("cc1", values, steps).unwrap_err();
+            assert!(error.contains(said), "{values:?} {steps}: {error}");
         }
     }
 }

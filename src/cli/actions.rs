@@ -45,8 +45,9 @@ fn replay_command(replay: &Replay<'_>) -> String {
 }
 
 /// Returns the command that resumes a campaign: the command that started it, without the options
-/// that would end it at the same sample again, and with the folder in which its results are.
-fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> String {
+/// that would end it at the same sample again, and with the folder in which its results are. A
+/// command with paths that are relative to another folder runs there.
+fn resume_command(Resume { command, retries_errors, moved_to, working_folder }: Resume<'_>) -> String {
     if let [call] = command {
         return resume_call(call, retries_errors, moved_to);
     }
@@ -56,7 +57,11 @@ fn resume_command(Resume { command, retries_errors, moved_to }: Resume<'_>) -> S
     let folder = moved_to.iter().filter(|_| !is_named).flat_map(|folder| ["--out", folder]);
     let is_retried = retries_errors && !command.iter().any(|word| word == "--retry-errors");
     let resumed = std::iter::once("--resume").chain(is_retried.then_some("--retry-errors"));
-    words.into_iter().chain(folder).chain(resumed).map(quoted).collect::<Vec<_>>().join(" ")
+    let resumed = words.into_iter().chain(folder).chain(resumed).map(quoted).collect::<Vec<_>>().join(" ");
+    match working_folder {
+        Some(folder) => format!("cd {} && {resumed}", quoted(folder)),
+        None => resumed,
+    }
 }
 
 /// Returns the words of a command with another folder for its results, and whether it names one.
@@ -104,7 +109,7 @@ mod tests {
     fn the_resume_command_is_the_command_with_quotes_and_resume() {
         let resumed = |text: &str, retries_errors, moved_to| {
             let command = shlex::split(text).unwrap_or_default();
-            command_for(&Action::Resume(Resume { command: &command, retries_errors, moved_to }))
+            command_for(&Action::Resume(Resume { command: &command, retries_errors, moved_to, working_folder: None }))
         };
         assert_eq!(
             resumed("closecall campaign 'a b.toml' --out x --fail-fast", false, None),
@@ -120,13 +125,25 @@ mod tests {
     }
 
     #[test]
+    fn a_command_with_the_paths_of_another_folder_runs_there() {
+        let command = ["closecall", "campaign", "own/a.toml", "--out", "x"].map(str::to_owned);
+        let resumed = |working_folder| {
+            let moved_to = Some("/there/x y");
+            command_for(&Action::Resume(Resume { command: &command, retries_errors: false, moved_to, working_folder }))
+        };
+        let there = "closecall campaign own/a.toml --out '/there/x y' --resume";
+        assert_eq!(resumed(None), there);
+        assert_eq!(resumed(Some("/the re")), format!("cd '/the re' && {there}"));
+    }
+
+    #[test]
     fn the_resume_call_is_the_call_with_resume() {
         let call = ["closecall.campaign(['x'], out='y', fail_fast=True)".to_owned()];
-        let resumed =
-            |retries_errors| command_for(&Action::Resume(Resume { command: &call, retries_errors, moved_to: None }));
+        let plain = Resume { command: &call, retries_errors: false, moved_to: None, working_folder: None };
+        let resumed = |retries_errors| command_for(&Action::Resume(Resume { retries_errors, ..plain }));
         assert_eq!(resumed(false), "closecall.campaign(['x'], out='y', resume=True)");
         assert_eq!(resumed(true), "closecall.campaign(['x'], out='y', resume=True, retry_errors=True)");
-        let moved = Resume { command: &call, retries_errors: false, moved_to: Some("z") };
+        let moved = Resume { moved_to: Some("z"), ..plain };
         assert_eq!(command_for(&Action::Resume(moved)), "closecall.campaign(['x'], out='z', resume=True)");
     }
 

@@ -36,7 +36,7 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall explain closecall-results",
-    "closecall explain closecall-results 17",
+    "closecall explain closecall-results 34",
     "closecall explain closecall-results --scenario low-thw-overtake --most 10",
 ]))]
 pub(super) struct ExplainArgs {
@@ -89,8 +89,8 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
 /// Arguments of `closecall minimize`.
 #[derive(Debug, Args)]
 #[command(after_help = examples([
-    "closecall minimize closecall-results 17",
-    "closecall minimize closecall-results 17 --scenario low-thw-overtake --controller mis -o case.toml",
+    "closecall minimize closecall-results 34",
+    "closecall minimize closecall-results 34 --scenario low-thw-overtake --controller mis -o case.toml",
     "closecall minimize closecall-results --nearest --runs 1000 --format json",
 ]))]
 pub(super) struct MinimizeArgs {

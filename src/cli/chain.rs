@@ -33,7 +33,7 @@ use closecall_recorded::fit::{Quantity, Samples, observe};
 use closecall_recorded::trajectory_data::{TrajectoryData, count_flaws};
 use closecall_report::campaign::origins::{Origin, OriginFile, Origins, OriginsText};
 use closecall_report::run::figure::still;
-use closecall_report::run::film::film_lane_change;
+use closecall_report::run::film::{Part, film_lane_change};
 use closecall_report::run::rerun::{is_recording_enabled, write_recording};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Function, ScenarioError, ScenarioFile, Spreads, logical};
@@ -67,8 +67,8 @@ const RECORDED: u64 = 1;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall traffic chain traffic.csv -o chain",
-    "closecall traffic chain one.csv two.csv -o chain -n 200 --seed 7",
-    "closecall traffic chain traffic.csv -o chain --encounters 20 --gate 'upper(induced) <= 0.05'",
+    "closecall traffic chain one.csv two.csv -o both -n 200 --seed 7",
+    "closecall traffic chain traffic.csv -o twenty --encounters 20 --gate 'upper(induced) <= 0.05'",
 ]))]
 pub(super) struct ChainArgs {
     #[command(flatten)]
@@ -351,15 +351,20 @@ impl Companion for Chain {
             write_file(&folder.file(&format!("{SCENARIOS}/{name}.toml")), |written| {
                 written.write_all(text.as_bytes())
             })?;
-            let film = film_lane_change(&recording.data, &approach.change)?;
-            let picture = format!("{ENCOUNTERS}/{name}.svg");
-            write_file(&folder.file(&picture), |written| written.write_all(still(&film).as_bytes()))?;
-            origin.picture = Some(picture);
+            let film = [film_lane_change(&recording.data, &approach.change)?];
             if is_recording_enabled() {
                 let path = format!("{ENCOUNTERS}/{name}.rrd");
-                write_recording(&folder.file(&path), &[film])?;
+                write_recording(&folder.file(&path), &film)?;
                 origin.recording = Some(path);
             }
+            let [film] = film;
+            let lead = approach.lead.as_ref().map(|lead| (Part::Lead, lead.track_id));
+            let others = [(Part::Ego, approach.ego.track_id), (Part::Rear, approach.rear.track_id)];
+            let parts: Vec<_> = others.into_iter().chain(lead).collect();
+            let drawn = still(&film.with_parts_of_tracks(&parts));
+            let picture = format!("{ENCOUNTERS}/{name}.svg");
+            write_file(&folder.file(&picture), |written| written.write_all(drawn.as_bytes()))?;
+            origin.picture = Some(picture);
         }
         Ok(self.origins.write(folder)?)
     }

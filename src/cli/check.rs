@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use closecall_campaign::folder::Folder;
+use closecall_campaign::folder::{FAST_SAMPLES, Folder};
 use closecall_campaign::integrity::Problem;
 use closecall_report::campaign::check_folder;
 use closecall_report::json::stamped;
@@ -106,9 +106,16 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     Ok(source::expand(paths)?)
 }
 
-/// Checks whether folders of campaigns are whole.
+/// Checks whether folders of campaigns are whole, each with its fast samples.
 fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
-    let checked: Vec<_> = paths.iter().map(|path| (path, check_folder(&Folder::open(path), command_for))).collect();
+    let fast = |path: &Path| Some(path.join(FAST_SAMPLES)).filter(|fast| fast.is_dir() && !paths.contains(&fast));
+    let paths = paths.iter().flat_map(|&path| [Some(path.clone()), fast(path)]).flatten();
+    let checked: Vec<_> = paths
+        .map(|path| {
+            let integrity = check_folder(&Folder::open(&path), command_for);
+            (path, integrity)
+        })
+        .collect();
     let is_sound = checked.iter().all(|(_, integrity)| integrity.is_sound());
     match format {
         Format::Json => {

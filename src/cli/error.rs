@@ -126,6 +126,16 @@ pub enum CliError {
         /// How far the closest driver is from the recording.
         source: StepZeroError,
     },
+    /// A parameter that a sample varies cannot have one of its values.
+    #[error("{} {parameter} cannot be {value}: {reason}", Argument("vary"))]
+    VariedValue {
+        /// The parameter, as it was named.
+        parameter: String,
+        /// The value.
+        value: f64,
+        /// The key of the scenario that refuses it, and what is allowed.
+        reason: String,
+    },
     /// A trajectory file has nothing that the command needs.
     #[error("{message}")]
     NothingFound {
@@ -360,6 +370,7 @@ impl From<&CliError> for ExitCode {
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
             | CliError::NotReproduced { .. }
+            | CliError::VariedValue { .. }
             | CliError::Project(ProjectError { is_io: false, .. })
             | CliError::View(ViewError::Nothing { .. } | ViewError::Foreign { .. })
             | CliError::Aerial(AerialError::Traffic { .. } | AerialError::Network(_) | AerialError::Output { .. })

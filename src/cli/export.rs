@@ -48,7 +48,7 @@ impl From<FormChoice> for Form {
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall tool export low-thw-overtake -o case",
-    "closecall tool export closecall-results 17 -o case",
+    "closecall tool export closecall-results 34 -o case",
     "closecall tool export late-braking.toml 3 --seed 1 --form logical --value-sets 100 -o case",
 ]))]
 pub(super) struct ExportArgs {

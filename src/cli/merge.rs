@@ -31,8 +31,8 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall tool merge part-1 part-2 --out merged",
-    "closecall tool merge part-* --out merged --gate 'upper(induced) <= 0.01'",
-    "closecall tool merge part-1 part-2 --out merged --record worst:3 --format json",
+    "closecall tool merge part-* --out gated --gate 'upper(induced) <= 0.01'",
+    "closecall tool merge part-1 part-2 --out recorded --record worst:3 --format json",
 ]))]
 pub(super) struct MergeArgs {
     /// Folders of all parts of one campaign, each made with `campaign --partition I/N`

@@ -20,7 +20,7 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall new late-braking",
-    "closecall new late-braking --from low-thw-overtake",
+    "closecall new close-overtake --from low-thw-overtake",
     "closecall new late-braking -o scenarios/late-braking.toml",
 ]))]
 pub(super) struct NewArgs {

@@ -25,7 +25,7 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall plot low-thw-overtake -o encounter.svg",
-    "closecall plot closecall-results 17 -o sample-17.pdf",
+    "closecall plot closecall-results 34 -o sample-34.pdf",
     "closecall plot low-thw-overtake --sample 7 --paired --width-mm 160 -o pair.png",
 ]))]
 pub(super) struct PlotArgs {

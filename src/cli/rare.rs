@@ -276,8 +276,14 @@ impl Rare<'_> {
         let runs = bar.position();
         bar.finish_and_clear();
         let command = session::arguments();
-        let resume =
-            || command_for(&Action::Resume(Resume { command: &command, retries_errors: false, moved_to: None }));
+        let resume = || {
+            command_for(&Action::Resume(Resume {
+                command: &command,
+                retries_errors: false,
+                moved_to: None,
+                working_folder: None,
+            }))
+        };
         let resume = self.folder.map(|_| resume());
         let signal = session::received().map_or("stopped", Signal::name);
         match (self.format, resume) {

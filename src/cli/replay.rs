@@ -17,9 +17,9 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall replay`.
 #[derive(Debug, Args)]
 #[command(after_help = examples([
-    "closecall replay closecall-results 17",
-    "closecall replay closecall-results 17 --paired --record pair.rrd",
-    "closecall replay closecall-results 17 --scenario low-thw-overtake --set environment.friction=0.5",
+    "closecall replay closecall-results 34",
+    "closecall replay closecall-results 34 --paired --record pair.rrd",
+    "closecall replay closecall-results 34 --scenario low-thw-overtake --set environment.friction=0.5",
 ]))]
 pub(super) struct ReplayArgs {
     #[command(flatten)]

@@ -235,7 +235,8 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
         print_error(format_args!("the last results are now in {}{removed}\n", to.display()));
         if let Some(command) = interrupted {
             let folder = to.display().to_string();
-            let resumed = Resume { command: &command, retries_errors: false, moved_to: Some(&folder) };
+            let resumed =
+                Resume { command: &command, retries_errors: false, moved_to: Some(&folder), working_folder: None };
             let resume = command_for(&Action::Resume(resumed));
             print_error(format_args!("their campaign has not come to its end; it is resumed by: {resume}\n"));
         }

@@ -8,7 +8,7 @@ use closecall_report::json::stamped;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::reproduction::{StepZeroError, step_zero};
 use closecall_report::traffic::sampling::{Sampled, StepError, run_step};
-use closecall_scenarios::{ScenarioFile, Variation, sampled};
+use closecall_scenarios::{ScenarioError, ScenarioFile, StepValue, Variation, sampled};
 use closecall_simulation::calibration::value_of;
 use closecall_traffic::atomic::write_file;
 
@@ -108,8 +108,14 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let mut films: Vec<_> = zero.run.film.into_iter().collect();
     let mut files: Vec<(String, ScenarioFile)> = Vec::new();
     let mut steps = vec![zero.step];
+    let scenario_of = |value: StepValue<'_>| {
+        let made = sampled(&found, (&zero.driver, Some(value)), inputs);
+        made.map_err(|error| of_value(&args.vary, value, error))
+    };
+    // The last value is checked first: the message names it as the user wrote it, not one between.
+    variation.steps().last().map(scenario_of).transpose()?;
     for (number, value) in (1..).zip(variation.steps()) {
-        let step = sampled(&found, (&zero.driver, Some(value)), inputs)?;
+        let step = scenario_of(value)?;
         let done = run_step(&found, (value.label(), Some(value.value)), &step, args.seed);
         let done = done.map_err(|error| of_step(error, number))?;
         films.extend(done.film);
@@ -136,6 +142,17 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         Format::Human => print_text(&all),
     }
     Ok(ExitCode::Pass)
+}
+
+/// Returns the error of a value that the parameter cannot have. The user has written no file that the
+/// message could name.
+fn of_value(parameter: &str, StepValue { value, .. }: StepValue<'_>, error: ScenarioError) -> CliError {
+    match error {
+        ScenarioError::Value { source, .. } => {
+            CliError::VariedValue { parameter: parameter.to_owned(), value, reason: source.to_string() }
+        }
+        other => other.into(),
+    }
 }
 
 /// Returns the error of a step.

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use closecall_campaign::folder::{EXPLORER, MANIFEST, RECORDINGS, REPORT};
 use closecall_report::run::rerun::{RerunVersion, VersionError};
+use closecall_traffic::input::named;
 
 use super::CliError;
 use super::explore::{ViewerChoice, explore, export};
@@ -123,7 +124,7 @@ fn recordings(path: &Path) -> Result<Vec<Recording>, ViewError> {
     let is_recording = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "rrd");
     let read = |source| ViewError::Read { path: path.to_owned(), source };
     let mut files = Vec::new();
-    if fs::metadata(path).map_err(read)?.is_dir() {
+    if fs::metadata(path).map_err(|error| read(named(path, error)))?.is_dir() {
         let lower = path.join(RECORDINGS);
         for folder in [Some(path), Some(lower.as_path()).filter(|lower| lower.is_dir())].into_iter().flatten() {
             for entry in fs::read_dir(folder).map_err(read)? {

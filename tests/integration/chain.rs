@@ -121,11 +121,16 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
     let names: BTreeSet<&str> = origins.iter().map(|origin| origin["scenario"].as_str().unwrap()).collect();
     assert_eq!(names.len(), 6, "names are distinct: {names:?}");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
-    let (mut engaged, mut samples, mut carriageways) = (0, 0, BTreeSet::new());
+    let (mut engaged, mut samples, mut pink, mut carriageways) = (0, 0, 0, BTreeSet::new());
     for origin in origins {
         let [lead, ego, rear] = ["lead_track", "ego_track", "rear_track"].map(|key| origin[key].as_u64().unwrap());
         assert_eq!((ego, rear), (lead + 1, lead + 2), "the vehicles of one group on one carriageway: {origin}");
-        assert!(page.contains(&format!("Recorded: track {rear}, the rear vehicle, is blue. ")), "{rear}");
+        assert!(
+            page.contains(&format!(
+                "Recorded: track {rear}, the rear vehicle, is pink; track {ego}, the ego, is blue. "
+            )),
+            "{rear}"
+        );
         carriageways.insert((lead / 3) % 2);
         let [from_s, to_s] = ["from_s", "to_s"].map(|key| origin[key].as_f64().unwrap());
         assert!(from_s < to_s && page.contains(&format!("{from_s:.1} to {to_s:.1} s")), "{origin}");
@@ -136,6 +141,13 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
             assert!(out.join(&file).is_file(), "{file}");
             assert!(file.ends_with("svg") || page.contains(&file), "{file} is linked");
         }
+        // The colours of the picture are those of every other picture.
+        let picture = fs::read_to_string(out.join(format!("encounters/{name}.svg"))).unwrap();
+        let label = |track: u64| picture.lines().find(|line| line.contains(&format!(">track-{track} ")));
+        pink += u64::from(label(rear).is_some_and(|label| label.contains("#d4307c")));
+        assert!(label(rear).is_none_or(|label| label.contains("#d4307c")), "{rear}: {:?}", label(rear));
+        assert!(label(ego).is_none_or(|label| label.contains("#1f6fd1")), "{ego}: {:?}", label(ego));
+        assert!(label(lead).is_none_or(|label| label.contains("#d98200")), "{lead}: {:?}", label(lead));
         let engagement = &origin["engagement"];
         let missing: u64 =
             engagement["missing"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
@@ -143,6 +155,7 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
         samples += engagement["engaged"].as_u64().unwrap() + missing;
     }
     assert_eq!((samples, carriageways.len()), (120, 2));
+    assert!(pink > 0, "no rear vehicle has a label");
     assert!(engaged > 0 && page.contains(&format!("the system engages in {engaged} of 120 samples")), "{engaged}");
     // The choice is also in the summary.
     let summary = fs::read_to_string(out.join("summary.md")).unwrap();

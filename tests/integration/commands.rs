@@ -331,6 +331,56 @@ fn the_help_of_each_command_ends_with_three_examples_that_parse() {
     }
 }
 
+/// A sample of the default campaign of the headline that fails with the system under test: the
+/// examples of the help name it.
+const FAILING: &str = "closecall-results 34";
+
+#[test]
+fn the_examples_of_the_help_work_on_the_results_of_a_first_campaign() {
+    let folder = folder();
+    let words = ["campaign", "low-thw-overtake", "-n", "60", "--paired", "--no-gate", "--record", "failures:0"];
+    stdout(&run_in(folder.path(), &words), 0);
+    let mut run = Vec::new();
+    for (_, command) in commands() {
+        let help = command.get_after_help().unwrap().to_string();
+        for example in help.lines().filter(|line| line.trim_start().starts_with("closecall ")) {
+            let names_sample = example
+                .split_once("closecall-results ")
+                .is_some_and(|(_, rest)| rest.split(' ').next().is_some_and(|word| word.parse::<u64>().is_ok()));
+            assert_eq!(names_sample, example.contains(FAILING), "another sample may not fail: {example}");
+            if names_sample {
+                let words = shlex::split(example).unwrap();
+                let output = program().current_dir(folder.path()).args(&words[1..]).output().unwrap();
+                assert_eq!(code(&output), 0, "{example}: {}", stderr(&output));
+                run.push(words[1].clone());
+            }
+        }
+    }
+    run.sort();
+    run.dedup();
+    assert_eq!(run, ["explain", "minimize", "plot", "replay", "tool"]);
+}
+
+#[test]
+fn no_example_of_a_command_writes_what_another_one_has_written() {
+    // A folder of results is not overwritten by another campaign, and a scenario not by a new one.
+    for name in ["closecall traffic chain", "closecall tool merge", "closecall new"] {
+        let (_, command) = commands().into_iter().find(|(words, _)| words == name).unwrap();
+        let help = command.get_after_help().unwrap().to_string();
+        let written: Vec<String> = help
+            .lines()
+            .filter(|line| line.trim_start().starts_with("closecall "))
+            .map(|example| {
+                let words = shlex::split(example).unwrap();
+                let option = words.iter().position(|word| ["-o", "--out"].contains(&word.as_str()));
+                option.map_or_else(|| format!("{}.toml", words[2]), |at| words[at + 1].clone())
+            })
+            .collect();
+        let distinct: std::collections::BTreeSet<&String> = written.iter().collect();
+        assert_eq!((written.len(), distinct.len()), (3, 3), "{name}: {written:?}");
+    }
+}
+
 #[test]
 fn the_name_of_a_grouped_command_alone_is_answered_with_its_whole_name() {
     let whole = grouped().into_iter().map(|(name, group)| (format!("{group} {name}"), name));

@@ -178,6 +178,34 @@ fn a_campaign_that_is_killed_among_its_fast_samples_resumes_to_the_same_bytes() 
 }
 
 #[test]
+fn a_check_covers_fast_samples_and_asks_for_no_reports_of_theirs() {
+    let place = folder();
+    let out = campaign(&place.path().join("out"), &format!("-n 4 {SLOW}"));
+    let fast = out.join("fidelity");
+    let check = |path: &Path, expected| stdout(&closecall(["check", path.to_str().unwrap()]), expected);
+    let text = check(&out, 0);
+    assert!(text.contains("out: sound, 4 samples") && text.contains("fidelity: sound, 12 samples"), "{text}");
+    assert!(check(&fast, 0).ends_with("fidelity: sound, 12 samples\n"));
+    let both = closecall(["check", out.to_str().unwrap(), fast.to_str().unwrap(), "--format", "json"]);
+    assert_eq!(json(&both, 0)["campaigns"].as_array().unwrap().len(), 2, "each folder is there once");
+
+    tear(&fast.join("journal.jsonl"), 5);
+    for path in [&out, &fast] {
+        let text = check(path, 3);
+        assert!(text.contains("fidelity/journal.jsonl:7: "), "{text}");
+        // The campaign resumes its fast samples. Their folder is none of its own.
+        assert!(text.contains(&format!("--out {} ", out.display())) && text.contains(" --resume"), "{text}");
+        assert!(!text.contains("summary.md") && !text.contains("outcomes.parquet"), "{text}");
+    }
+    campaign(&out, &format!("-n 4 {SLOW} --resume"));
+    check(&out, 0);
+    // A campaign in a folder of this name has reports, unless the folder belongs to another campaign.
+    let alone = campaign(&place.path().join("fidelity"), "-n 2 --sensors ground-truth --record failures:0");
+    fs::remove_file(alone.join("summary.md")).unwrap();
+    assert!(check(&alone, 3).contains("summary.md: it is missing"));
+}
+
+#[test]
 fn a_signal_ends_a_campaign_among_its_fast_samples_without_a_verdict() {
     let place = folder();
     let out = place.path().join("out");

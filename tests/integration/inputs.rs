@@ -42,6 +42,33 @@ fn no_command_overwrites_an_input() {
 }
 
 #[test]
+fn a_dash_in_place_of_a_recording_is_said_to_be_no_standard_input() {
+    let folder = folder();
+    let cases: [&[&str]; 8] = [
+        &["traffic", "inspect", "-"],
+        &["traffic", "lane-changes", "-"],
+        &["traffic", "criticality", "-"],
+        &["traffic", "fit", "-"],
+        &["traffic", "calibrate", "-"],
+        &["study", "perceive", "-"],
+        &["tool", "import", "-", "-o", "scenario.toml"],
+        &["view", "-", "--no-open"],
+    ];
+    for case in cases {
+        let output = program().args(case).current_dir(folder.path()).output().unwrap();
+        assert_eq!(code(&output), 6, "{case:?}: {}", stderr(&output));
+        let said = message(&output);
+        assert!(said.contains("standard input is not read here: name a file"), "{case:?}: {said}");
+        assert!(!folder.path().join("scenario.toml").exists(), "{case:?}");
+    }
+    // A file of this name is a file.
+    fs::write(folder.path().join("-"), "").unwrap();
+    let output = program().args(["traffic", "inspect", "-"]).current_dir(folder.path()).output().unwrap();
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(message(&output).contains("there are no rows"), "{}", message(&output));
+}
+
+#[test]
 #[cfg(unix)]
 fn an_endless_input_is_refused() {
     let endless = "/dev/zero";

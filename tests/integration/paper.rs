@@ -26,6 +26,9 @@ fn check_figures(out: &Path, names: &[&str]) {
     for text in ["Figure 3", "Figure 5", "Figure 6", "Figure 7", "to the left (n = "].iter().chain(names) {
         assert!(page.contains(text), "{text}");
     }
+    // The page has the style of every other page, in the dark, too. Each picture has a frame.
+    assert!(page.contains("prefers-color-scheme: dark") && page.contains("name=\"viewport\""));
+    assert_eq!(page.matches("<figure>").count(), page.matches("<svg").count());
 }
 
 #[test]

@@ -126,16 +126,22 @@ fn any_parameter_of_a_driver_can_be_varied_and_a_wrong_one_is_refused() {
     }
     for (vary, values, steps, words) in [
         ("cc99", ["1", "2"], "3", "allowed are cc0-m, cc1-s"),
-        ("cc1", ["1", "1"], "3", "two different numbers"),
+        ("cc1", ["1", "1"], "3", "two different finite numbers"),
         ("cc1", ["1", "2"], "1", "2 to 100"),
     ] {
         let refused = sample(vary, values, steps);
         assert_eq!(code(&refused), 2);
         assert!(message(&refused).contains(words), "{}", message(&refused));
     }
-    let beyond = sample("cc1", ["1", "-2"], "2");
-    assert_eq!(code(&beyond), 3);
-    assert!(message(&beyond).contains("cc1-s"), "{}", message(&beyond));
+    // The message names the value that was written, and no value between.
+    for (values, written) in [(["1", "-2"], "-2"), (["-2", "1"], "-2"), (["1", "10.5"], "10.5")] {
+        let beyond = sample("cc1", values, "5");
+        assert_eq!(code(&beyond), 3);
+        let said = message(&beyond);
+        assert!(said.contains(&format!("--vary cc1 cannot be {written}: ")), "{said}");
+        assert!(said.contains("cc1-s") && said.contains("a number from 0 to 10 is needed"), "{said}");
+        assert!(!said.contains("failed to check"), "{said}");
+    }
     let nowhere = sample("actor.nobody.driver.wiedemann99.cc1-s", ["1", "2"], "2");
     assert!(message(&nowhere).contains("nobody"), "{}", message(&nowhere));
 }

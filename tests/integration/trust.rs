@@ -8,7 +8,7 @@ use std::process::Output;
 use serde_json::Value;
 
 use crate::native_controllers::{compile, lib, with_fault};
-use crate::support::{closecall, code, folder, message, program, records, stderr, stdout};
+use crate::support::{closecall, code, folder, library, message, program, records, stderr, stdout};
 
 const CAMPAIGN: [&str; 8] =
     ["campaign", "low-thw-overtake", "-n", "8", "--no-gate", "--sensors", "ground-truth", "--record=failures:0"];
@@ -218,6 +218,34 @@ fn the_repair_of_a_copied_folder_names_the_copy_and_the_failures_of_a_part_are_n
     let output = closecall(["explain", copy.to_str().unwrap()]);
     assert_eq!(code(&output), 3, "{}", stderr(&output));
     assert!(message(&output).contains("it has 6 of the 8 samples"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_repair_works_in_another_folder_than_the_campaign_ran_in() {
+    let folder = folder();
+    let [there, elsewhere] = ["one folder", "another"].map(|name| folder.path().join(name));
+    for path in [&there, &elsewhere] {
+        fs::create_dir(path).unwrap();
+    }
+    fs::copy(library("low-thw-overtake"), there.join("own scenario.toml")).unwrap();
+    let words = "campaign|own scenario.toml|-n|4|--sensors|ground-truth|--no-gate|--record=failures:0|--out|o ut";
+    stdout(&program().args(words.split('|')).current_dir(&there).output().unwrap(), 0);
+    let out = there.join("o ut");
+    let whole = lines(&out);
+    write_lines(&out, &whole[..2]);
+    let repair = |from: &Path, path: &str| {
+        let text = stdout(&program().args(["check", path]).current_dir(from).output().unwrap(), 3);
+        text.lines().find_map(|line| line.split_once("repair: resume the campaign: ")).unwrap().1.to_owned()
+    };
+    assert!(repair(&there, "o ut").contains(" --out 'o ut' "), "the paths are relative to the folder of the user");
+    let command = repair(&elsewhere, "../one folder/o ut");
+    assert!(command.starts_with("cd '") && command.contains(" 'own scenario.toml' "), "{command}");
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", &command]).current_dir(&elsewhere).env("XDG_STATE_HOME", env!("CARGO_TARGET_TMPDIR"));
+    let shell = shell.output().unwrap();
+    assert_eq!(code(&shell), 0, "{command}: {}", stderr(&shell));
+    assert!(lines(&out) == whole);
+    assert!(fs::read_dir(&elsewhere).unwrap().next().is_none(), "the repair writes nothing there");
 }
 
 #[test]

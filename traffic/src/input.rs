@@ -6,6 +6,9 @@
 //! | a symbolic link | followed | refused: it may lead to a file that the campaign would overwrite |
 //! | a named pipe, a socket, a device | refused: it may never end, or never begin | refused |
 //! | `/dev/stdin`, `/dev/fd/N`, `/dev/null` | opened | refused |
+//!
+//! The path `-` is the name of a file here. If there is no such file, the error says so (see
+//! [`named`]): other programs and some commands read standard input there.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
@@ -25,7 +28,18 @@ const BYTE_ORDER_MARK: char = '\u{feff}';
 /// neither a file nor a folder.
 pub fn open(path: &Path) -> io::Result<File> {
     let is_stream = cfg!(unix) && ["/dev/stdin", "/dev/fd", "/dev/null", "/proc"].iter().any(|at| path.starts_with(at));
-    if is_stream { File::open(path) } else { checked(path, OpenOptions::new().read(true), false) }
+    let opened = if is_stream { File::open(path) } else { checked(path, OpenOptions::new().read(true), false) };
+    opened.map_err(|error| named(path, error))
+}
+
+/// Returns the error of an input that cannot be read. If the path is `-`, and there is no such
+/// file, the error says that standard input is not read. The kind of the error stays.
+pub fn named(path: &Path, error: io::Error) -> io::Error {
+    if path.as_os_str() == "-" && error.kind() == ErrorKind::NotFound {
+        let message = "there is no file of this name, and standard input is not read here: name a file";
+        return io::Error::new(ErrorKind::NotFound, message);
+    }
+    error
 }
 
 /// Opens a file that another program has named, to write at its end.
@@ -132,6 +146,20 @@ mod tests {
         assert_eq!(read(&path, 10).unwrap().len(), 10);
         std::fs::write(&path, [0xff]).unwrap();
         assert!(read_text(&path).unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    #[test]
+    fn a_dash_is_said_to_be_no_standard_input() {
+        let missing = || io::Error::from(ErrorKind::NotFound);
+        let error = named(Path::new("-"), missing());
+        assert!(error.to_string().contains("standard input is not read here"), "{error}");
+        assert_eq!(error.kind(), ErrorKind::NotFound);
+        // Any other path, and any other error, says what the system says.
+        for other in ["./-", "-.csv", "a.csv"] {
+            assert_eq!(named(Path::new(other), missing()).to_string(), missing().to_string(), "{other}");
+        }
+        let denied = io::Error::from(ErrorKind::PermissionDenied);
+        assert_eq!(named(Path::new("-"), denied).kind(), ErrorKind::PermissionDenied);
     }
 
     #[cfg(unix)]

@@ -25,7 +25,7 @@ mod text_table;
 
 use std::path::{Path, PathBuf};
 
-use closecall_traffic::Time;
+use closecall_traffic::{Time, input};
 
 pub use error::{Origin, ScanFileError, ScanFileProblem};
 pub use labels::{Label, Labels};
@@ -59,7 +59,7 @@ impl Recording {
     /// [`ScanFileError`] if it cannot be read, or is none.
     pub fn open(path: &Path, options: ScanOptions) -> Result<Self, ScanFileError> {
         let origin = Origin::file(path);
-        let metadata = std::fs::metadata(path).map_err(|error| origin.error(error))?;
+        let metadata = std::fs::metadata(path).map_err(|error| origin.error(input::named(path, error)))?;
         let end = path.extension().and_then(|end| end.to_str()).map(str::to_ascii_lowercase);
         let source = match end.as_deref() {
             _ if metadata.is_dir() => Source::Folder(PcdRecording::open(path, &options)?),

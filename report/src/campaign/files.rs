@@ -241,7 +241,7 @@ impl CampaignReport<'_> {
 pub fn check_folder(folder: &Folder, command_for: CommandFor) -> Integrity {
     const TABLE: &str = "outcomes.parquet";
     let mut integrity = Integrity::of(folder, command_for);
-    if !integrity.is_sound() {
+    if !integrity.is_sound() || folder.campaign_of_fast_samples().is_some() {
         return integrity;
     }
     match is_table_of_journal(folder, TABLE) {

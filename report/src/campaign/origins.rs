@@ -315,7 +315,7 @@ fn encounter(findings: &Findings<'_>, folder: &Folder, origin: &Origin) -> Marku
             figure {
                 @if let Some(picture) = picture { (PreEscaped(without_declaration(&picture))) }
                 figcaption {
-                    "Recorded: track " (origin.rear_track) ", the rear vehicle, is blue. "
+                    "Recorded: track " (origin.rear_track) ", the rear vehicle, is pink; track " (origin.ego_track) ", the ego, is blue. "
                     @if let Some(path) = &origin.recording { a href=(path) { (path) } }
                 }
             }

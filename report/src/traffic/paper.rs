@@ -9,12 +9,13 @@
 
 use closecall_recorded::criticality::{CriticalLaneChange, Statistics, statistics};
 use closecall_recorded::robustness::Robustness;
-use maud::{DOCTYPE, PreEscaped, html};
+use maud::{PreEscaped, html};
 
 use super::paper_charts::{METRICS, histogram, share_chart};
 use super::robustness::{RobustnessText, robustness_charts};
 use super::statistics::{BOXED, Boxed, RecordedChanges, StatisticsText, box_chart, by_class, summary};
 use super::trajectory_charts::{BoxSummary, ChartError};
+use crate::campaign::html::page::{document, table};
 
 /// A picture of the page.
 #[derive(Clone, Debug)]
@@ -97,40 +98,31 @@ fn page(
 ) -> String {
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
     let figure = |number: u32| pictures.iter().filter(move |picture| picture.figure == number);
-    let drawn = |number: u32| html! { @for picture in figure(number) { div.picture { (PreEscaped(&picture.svg)) } } };
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Recorded lane changes" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { "Recorded lane changes" }
-                p { "Trajectory files: " (names.join(", ")) }
-                @if let Some((each, together)) = robustness {
-                    h2 { "Figure 3: what the criteria tolerate" }
-                    (drawn(3))
-                    h3 { "Lowest level of noise at which a criterion fails" }
-                    table {
-                        tr { th { "trajectory file" } @for criterion in &together.criteria { th { (criterion.name()) } } }
-                        @for row in failures(recordings, each) { tr { @for cell in row { td { (cell) } } } }
-                    }
-                    pre { (RobustnessText(together).to_string()) }
-                }
-                h2 { "Figure 5: durations, peak widths and speeds" }
-                (drawn(5))
-                pre { (StatisticsText(statistics).to_string()) }
-                h2 { "Figure 6: how often the values of each metric occur" }
-                (drawn(6))
-                h2 { "Figure 7: critical shares to the left and to the right" }
-                (drawn(7))
-            }
+    let drawn = |number: u32| {
+        html! {
+            div.drawings { @for picture in figure(number) { figure { (PreEscaped(&picture.svg)) } } }
         }
-    }
-    .into_string()
+    };
+    let body = html! {
+        h1 { "Recorded lane changes" }
+        p { "Trajectory files: " (names.join(", ")) }
+        @if let Some((each, together)) = robustness {
+            h2 { "Figure 3: what the criteria tolerate" }
+            (drawn(3))
+            h3 { "Lowest level of noise at which a criterion fails" }
+            (table(
+                &html! { th { "trajectory file" } @for criterion in &together.criteria { th { (criterion.name()) } } },
+                &html! { @for row in failures(recordings, each) { tr { @for cell in row { td { (cell) } } } } },
+            ))
+            pre { (RobustnessText(together).to_string()) }
+        }
+        h2 { "Figure 5: durations, peak widths and speeds" }
+        (drawn(5))
+        pre { (StatisticsText(statistics).to_string()) }
+        h2 { "Figure 6: how often the values of each metric occur" }
+        (drawn(6))
+        h2 { "Figure 7: critical shares to the left and to the right" }
+        (drawn(7))
+    };
+    document("Recorded lane changes", &body).into_string()
 }
-
-const STYLE: &str = "body{font-family:sans-serif;margin:2rem;max-width:1800px}.picture{display:inline-block}\
-                     td,th{padding:.2rem .8rem;text-align:left}pre{overflow-x:auto}";

@@ -340,8 +340,8 @@ fn log_normal(reader: &Reader, node: &Node) -> Result<Shape, ImportError> {
     number(reader, node, ParameterConfig { log_normal: Some(log_normal), ..ParameterConfig::default() })
 }
 
-/// Returns the numbers of a Poisson distribution with their probabilities in relation to the most
-/// probable one.
+/// Returns the numbers of a Poisson distribution, and a weight for each. The weight is the
+/// probability of the number, divided by the probability of the most probable number.
 fn poisson(reader: &Reader, node: &Node) -> Result<Shape, ImportError> {
     let expected = reader.number(node, "expectedValue")?;
     if !(expected > 0.0 && expected <= MOST_EXPECTED) {

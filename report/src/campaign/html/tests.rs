@@ -104,6 +104,7 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
         "page written on",
         "prefers-color-scheme: dark",
         "figure { overflow-x: auto; } figure svg { width: auto; min-width: 640px; max-width: none !important; }",
+        ".stills svg, .pair svg { min-width: 560px;",
     ] {
         assert!(page.contains(part), "{part}");
     }

@@ -34,7 +34,7 @@ pub(crate) use timeline::timeline;
 
 /// Returns whether a curve goes over to another vehicle. A vehicle in the path of the ego, and not yet
 /// in its lane, is no other one.
-fn is_another(last: Option<usize>, now: Option<usize>) -> bool {
+pub(in crate::run) fn is_another(last: Option<usize>, now: Option<usize>) -> bool {
     matches!((last, now), (Some(last), Some(now)) if last != now)
 }
 

@@ -80,7 +80,7 @@ pub fn film_lane_change(
     let tracks = nearby_tracks(&others, changer, &instants);
     let frames = instants.iter().map(|point| frame_at(&tracks, point.time)).collect();
     let film_actor = |track: &&Trajectory| FilmActor {
-        name: format!("track-{}", track.track_id),
+        name: track_name(track.track_id),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
         present_frames: present_frames(track, instants.iter().map(|point| point.time)),
         part: Part::Background,
@@ -110,6 +110,29 @@ pub fn film_lane_change(
     };
     mark_main(&mut film);
     Ok(film)
+}
+
+impl Film {
+    /// Gives the vehicles of a recorded lane change the parts of an encounter, each with its track, for
+    /// a picture in the colours of an encounter. The picture still moves with the vehicle that changes
+    /// lanes.
+    #[must_use]
+    pub fn with_parts_of_tracks(mut self, parts: &[(Part, u64)]) -> Self {
+        for (index, actor) in self.actors.iter_mut().enumerate() {
+            let part = parts.iter().find(|(_, track_id)| actor.name == track_name(*track_id)).map(|(part, _)| *part);
+            actor.part = match (part, actor.part) {
+                (Some(part), _) => part,
+                (None, Part::Ego | Part::Lead | Part::Rear) => Part::Other(index),
+                (None, part) => part,
+            };
+        }
+        self
+    }
+}
+
+/// Returns the name of a recorded vehicle in a film.
+fn track_name(track_id: u64) -> String {
+    format!("track-{track_id}")
 }
 
 /// The carriageway on which a lane change is shown. The readers put the second carriageway of a

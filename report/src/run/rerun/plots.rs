@@ -19,6 +19,7 @@ use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedCo
 use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
+use crate::run::figure::is_another;
 use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
@@ -198,6 +199,18 @@ impl Plots<'_> {
         Ok(true)
     }
 
+    /// Writes a curve about the vehicle that `vehicle` reads from the frames. It is interrupted where
+    /// another vehicle begins. Returns true if it has any value.
+    fn curve_about(
+        &self,
+        entity: &str,
+        style: &CurveStyle<'_>,
+        (vehicle, value): (fn(&Frame) -> Option<usize>, fn(&Frame) -> Option<f64>),
+    ) -> Result<bool, RecordingError> {
+        let frames = self.film.frames.iter().map(|frame| (vehicle(frame), value(frame)));
+        self.series(entity, style, &interrupted(frames))
+    }
+
     /// Extends the range of the plot to which `entity` belongs.
     fn note_span(&self, entity: &str, values: &[Option<f64>]) {
         let Some(kind) = Kind::of_entity(entity) else { return };
@@ -300,9 +313,11 @@ impl Plots<'_> {
     /// Writes the time headways in front of and behind the ego.
     fn headways(&self) -> Result<bool, RecordingError> {
         let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
-        let front = self.curve("plots/headway/front", &front, |frame| frame.margins.thw_front_s.ok())?;
+        let front =
+            self.curve_about("plots/headway/front", &front, (Frame::lead, |frame| frame.margins.thw_front_s.ok()))?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
-        let rear = self.curve("plots/headway/rear", &rear, |frame| frame.margins.thw_rear_s.ok())?;
+        let rear =
+            self.curve_about("plots/headway/rear", &rear, (Frame::follower, |frame| frame.margins.thw_rear_s.ok()))?;
         if front || rear {
             self.level("plots/headway/critical", "0.9 s", CRITICAL_THW_S)?;
         }
@@ -312,9 +327,11 @@ impl Plots<'_> {
     /// Writes the gaps in front of and behind the ego, and the rear gap as the MIS estimates it.
     fn gaps(&self) -> Result<bool, RecordingError> {
         let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
-        let front = self.curve("plots/gap/front", &front, |frame| frame.margins.gap_front_m.ok())?;
+        let front =
+            self.curve_about("plots/gap/front", &front, (Frame::lead, |frame| frame.margins.gap_front_m.ok()))?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
-        let rear = self.curve("plots/gap/rear", &rear, |frame| frame.margins.gap_rear_m.ok())?;
+        let rear =
+            self.curve_about("plots/gap/rear", &rear, (Frame::follower, |frame| frame.margins.gap_rear_m.ok()))?;
         let style = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         let perceived = self.curve("plots/gap/rear_seen", &style, |frame| Some(plan(frame)?.rear_gap_m))?;
         Ok(front || rear || perceived)
@@ -323,7 +340,7 @@ impl Plots<'_> {
     /// Writes the time to collision of the vehicle behind the ego.
     fn time_to_collision(&self) -> Result<bool, RecordingError> {
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
-        self.curve("plots/ttc/rear", &rear, |frame| frame.margins.ttc_rear_s.ok())
+        self.curve_about("plots/ttc/rear", &rear, (Frame::follower, |frame| frame.margins.ttc_rear_s.ok()))
     }
 
     /// Writes the next closest encounter at the present velocities, in the ground truth and as the
@@ -434,6 +451,18 @@ impl AsComponents for WithUnit {
     }
 }
 
+/// Returns the values of a curve, each with its vehicle. The first value of another vehicle is left
+/// out: the line would join the values of two vehicles.
+fn interrupted(values: impl Iterator<Item = (Option<usize>, Option<f64>)>) -> Vec<Option<f64>> {
+    let mut last = None;
+    let value_of = |(vehicle, value): (Option<usize>, Option<f64>)| {
+        let value = value.filter(|_| !is_another(last, vehicle));
+        last = vehicle;
+        value
+    };
+    values.map(value_of).collect()
+}
+
 /// Returns the plan of the MIS in a frame, if there is one.
 fn plan(frame: &Frame) -> Option<MisPlan> {
     frame.command?.plan
@@ -448,6 +477,16 @@ mod tests {
         let step = STEPS.into_iter().find(|step| *step >= LEAST_TICK_SHARE * (high - low)).unwrap();
         let count = (high / step).floor() - (low / step).ceil() + 1.0;
         if count > 0.0 { count as usize } else { 0 }
+    }
+
+    #[test]
+    fn a_curve_does_not_join_the_values_of_two_vehicles() {
+        let row = |vehicle, value| (vehicle, Some(value));
+        let of_two = [row(Some(2), 1.0), row(Some(2), 1.1), row(Some(3), 5.0), row(Some(3), 4.9)];
+        assert_eq!(interrupted(of_two.into_iter()), [Some(1.0), Some(1.1), None, Some(4.9)]);
+        // A vehicle in the path is not yet in the lane, and a curve of one vehicle has no other gap.
+        let of_one = [row(None, 3.0), row(Some(2), 2.9), (Some(2), None), row(Some(2), 2.7)];
+        assert_eq!(interrupted(of_one.into_iter()), [Some(3.0), Some(2.9), None, Some(2.7)]);
     }
 
     #[test]
