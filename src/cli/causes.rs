@@ -149,6 +149,7 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
         None => minimize_sample(&saved, &case)?,
     };
     let files = write_files(&case, &minimized, &paths, command_for)?;
+    [Some(&files.failing), files.twin.as_ref()].into_iter().flatten().for_each(|path| print_written(path));
     match args.format {
         Format::Json => {
             outln!("{:#}", stamped(json!({ "minimized": minimized, "files": files }), Some(minimized.seed), None))

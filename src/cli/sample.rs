@@ -128,7 +128,9 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         write_recording(&rrd, &films)?;
         print_written(&rrd);
         for (name, file) in &files {
-            write_file(&folder.join(name), |written| written.write_all(made_by(&args.file, file).as_bytes()))?;
+            let path = folder.join(name);
+            write_file(&path, |written| written.write_all(made_by(&args.file, file).as_bytes()))?;
+            print_written(&path);
         }
     }
     match args.format {

@@ -161,6 +161,8 @@ fn results_are_on_standard_output_and_the_paths_of_files_on_standard_error() {
     assert_eq!(code(&run_in(folder.path(), &campaign)), 0);
     let recorded =
         ["traffic", "record", "overtake-without-brake", "-n", "12", "--sensors", "ground-truth", "-o", "traffic.csv"];
+    let sampled = "traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3 --steps 2 -o sampled";
+    let sampled: Vec<&str> = sampled.split(' ').collect();
     for (words, file) in [
         (&["new", "mine"][..], "mine.toml"),
         (&["init", "repository"], "repository/closecall.toml"),
@@ -170,6 +172,9 @@ fn results_are_on_standard_output_and_the_paths_of_files_on_standard_error() {
         (&["tool", "export", "paper-figure", "-o", "case"], "case"),
         (&recorded, "traffic.csv"),
         (&["traffic", "fit", "traffic.csv", "-o", "fitted.toml"], "fitted.toml"),
+        (&["traffic", "reenact", "traffic.csv", "-o", "encounter.toml"], "encounter.toml"),
+        (&["traffic", "reenact", "traffic.csv", "--tracks", "tracks.parquet"], "tracks.parquet"),
+        (&sampled[..], "step-2.toml"),
     ] {
         let output = run_in(folder.path(), words);
         let printed = stdout(&output, 0);
