@@ -18,7 +18,7 @@ use textwrap::{WordSeparator, WordSplitter};
 use super::backend::choose_backend;
 use super::groups::{Study, Tool, Traffic};
 use super::help::heading;
-use super::output::{announce, print_error, print_failure};
+use super::output::{announce, command_heartbeat, print_error, print_failure};
 use super::terminal::error_columns;
 use super::version::{BUILD, name_commit};
 use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
@@ -325,7 +325,9 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     if !matches!(command, Command::Host { .. }) {
         choose_backend(onnxruntime.as_deref());
     }
+    let heartbeat = has_end(&command).then(command_heartbeat).flatten();
     let result = dispatch(command);
+    drop(heartbeat);
     end_all();
     remove_unpacked();
     match result {
@@ -351,6 +353,15 @@ fn wrong_stack() -> Option<String> {
     let (least, most) = (STACK_BYTES.start(), STACK_BYTES.end());
     (!STACK_BYTES.contains(&bytes))
         .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
+}
+
+/// Returns true if a command ends by itself: it serves nobody, and waits for no change of a file.
+const fn has_end(command: &Command) -> bool {
+    match command {
+        Command::View(_) | Command::Host { .. } => false,
+        Command::Check(args) => !args.is_watching(),
+        _ => true,
+    }
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {

@@ -15,7 +15,7 @@ use closecall_traffic::atomic::write_file;
 use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
 use super::help::{examples, heading};
-use super::output::{made_by, outln, print_text, print_written, write_charts};
+use super::output::{during, made_by, outln, print_text, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::chosen_by;
 use crate::exit_code::ExitCode;
@@ -110,7 +110,8 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let mut steps = vec![zero.step];
     for (number, value) in (1..).zip(variation.steps()) {
         let step = sampled(&found, (&zero.driver, Some(value)), inputs)?;
-        let done = run_step(&found, (value.label(), Some(value.value)), &step, args.seed);
+        let work = format!("running step {number} of {}", args.steps);
+        let done = during(work, || run_step(&found, (value.label(), Some(value.value)), &step, args.seed));
         let done = done.map_err(|error| of_step(error, number))?;
         films.extend(done.film);
         all.runs.push(done.run);

@@ -17,7 +17,7 @@ use closecall_simulation::{Arm, RunKey};
 use super::CliError;
 use super::backend::check_backend_of;
 use super::help::heading;
-use super::output::print_written;
+use super::output::{during, print_written};
 use super::protect::Output;
 
 /// The level of detail of a recording.
@@ -163,7 +163,8 @@ fn run(
             tables: is_tested.then_some(&mut tables),
             osi: osi.as_mut().filter(|_| is_tested),
         };
-        let outcome = run_guarded(scenario, key, arm, &mut observers)
+        let work = format!("running sample {} of {} with {}", key.sample, scenario.name, arm.controller.name());
+        let outcome = during(work, || run_guarded(scenario, key, arm, &mut observers))
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
         films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
         outcomes.push(outcome);
