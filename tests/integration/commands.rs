@@ -246,8 +246,29 @@ fn the_option_for_onnx_runtime_belongs_to_the_commands_that_may_run_the_network(
     for words in [&["list"][..], &["new"], &["init"], &["baseline", "save"], &["traffic", "fit"], &["tool", "schema"]] {
         assert!(!has_option(words), "{words:?}");
     }
-    let refused = closecall(["list", "--onnxruntime", "libonnxruntime.so"]);
-    assert!(code(&refused) == 2 && message(&refused).contains("--onnxruntime"), "{}", message(&refused));
+    let words = "compare, traffic record, traffic reenact, study frontier, tool export";
+    for words in words.split(", ").map(|words| words.split(' ').collect::<Vec<_>>()) {
+        assert!(has_option(&words), "{words:?}");
+    }
+    let words = "traffic calibrate, traffic paper, traffic sample, traffic robustness, study map, study perceive, \
+                 study exposure, study fidelity, tool import, tool render";
+    for words in words.split(", ").map(|words| words.split(' ').collect::<Vec<_>>()) {
+        assert!(!has_option(&words), "{words:?}");
+    }
+    for words in [&["list"][..], &["traffic", "calibrate", "pairs.csv"], &["traffic", "paper", "a.csv", "-o", "out"]] {
+        let refused = closecall(words.iter().chain(&["--onnxruntime", "libonnxruntime.so"]));
+        assert!(code(&refused) == 2 && message(&refused).contains("--onnxruntime"), "{}", message(&refused));
+    }
+    for (words, expected) in [
+        (&["check", "paper-figure"][..], "--onnxruntime needs --watch"),
+        (&["compare", "before", "after"], "--onnxruntime needs --search"),
+    ] {
+        let refused = closecall(words.iter().chain(&["--onnxruntime", "libonnxruntime.so"]));
+        assert!(code(&refused) == 2 && message(&refused).contains(expected), "{}", message(&refused));
+    }
+    // The variable is for all commands.
+    let checked = program().args(["check", "paper-figure"]).env("ORT_DYLIB_PATH", "libonnxruntime.so").output();
+    stdout(&checked.unwrap(), 0);
 }
 
 #[test]
