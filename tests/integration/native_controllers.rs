@@ -128,7 +128,10 @@ fn libraries_in_c_and_rust_have_the_outcomes_of_the_built_in_controller() {
 const FAULTS: [(&str, &str); 13] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV)); it last wrote: about to crash"),
     ("child", "the controller ended its process (signal: 11 (SIGSEGV))"),
-    ("throws", "the controller ended its process (signal: 6 (SIGABRT))"),
+    (
+        "throws",
+        "SIGABRT)); it last wrote: the library threw a C++ exception out of closecall_controller_step: catch it",
+    ),
     ("abort", "the controller ended its process (signal: 6 (SIGABRT))"),
     ("exit-0", "the controller ended its process (exit status: 0)"),
     ("exit-3", "the controller ended its process (exit status: 3)"),
