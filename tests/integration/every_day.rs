@@ -109,6 +109,9 @@ fn every_report_says_why_samples_failed_and_which_to_replay() {
     }
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("closecall replay . 0 --scenario low-thw-overtake --controller exec"));
+    // Nothing was measured.
+    let text = stdout(&failing(folder.path(), controller, &["--no-out"]), 5);
+    assert!(!text.contains("slower than the lead vehicle"), "{text}");
     // A campaign that ends early says it, too.
     let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast"]), 5);
     assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");
