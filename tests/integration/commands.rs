@@ -74,6 +74,9 @@ fn the_library_is_listed_and_works_from_anywhere() {
     assert!(listing.starts_with("paper-figure\n  Does the margin increase system"), "{listing}");
     assert_eq!(stdout(&run_in(folder.path(), &["list", "PAPER"]), 0), listing);
     assert_eq!(stdout(&run_in(folder.path(), &["list", "Fault"]), 0), faults);
+    let of_requirement = stdout(&run_in(folder.path(), &["list", "mis-2"]), 0);
+    assert!(of_requirement.contains("requirements: ") && of_requirement.contains("MIS-2"), "{of_requirement}");
+    assert!(of_requirement.lines().filter(|line| line.contains("requirements: ")).all(|line| line.contains("MIS-2")));
     let headline = stdout(&run_in(folder.path(), &["list", "headline"]), 0);
     for name in ["low-thw-overtake", "low-thw-overtake-as-recorded"] {
         assert!(headline.lines().any(|line| line == name), "{headline}");
@@ -81,7 +84,7 @@ fn the_library_is_listed_and_works_from_anywhere() {
     assert!(!headline.contains("paper-figure"), "{headline}");
     assert!(
         message(&run_in(folder.path(), &["list", "no-such"]))
-            .contains("no scenario has `no-such` in its name or as a tag")
+            .contains("no scenario has `no-such` in its name, as a tag or as a requirement")
     );
     let run = json(&run_in(folder.path(), &["run", "paper-figure", "--format", "json"]), 0);
     assert_eq!(run["scenario"], "paper-figure");
