@@ -19,7 +19,7 @@ pub enum Value {
     Label(String),
 }
 
-/// Significant digits of a value for readers: a difference of a thousandth of a parameter is no finding (-).
+/// Significant digits of a value for readers (-).
 const READABLE_DIGITS: i32 = 4;
 
 impl Value {

@@ -25,8 +25,8 @@ const fn is_hidden(c: char) -> bool {
     }
 }
 
-/// Returns the text with its control, bidirectional and invisible characters as numbers. A carriage return
-/// before a line feed stays.
+/// Returns the text with its control, bidirectional and invisible characters as numbers. A carriage
+/// return before a line feed stays.
 pub fn shown(text: &str) -> Cow<'_, str> {
     if !text.contains(is_hidden) {
         return Cow::Borrowed(text);
