@@ -2,9 +2,10 @@
 //! sample to run again.
 //!
 //! Two failures are of one kind if they have the same controller, the same name, and the same
-//! message apart from the numbers that differ from sample to sample: measured values, times, steps,
-//! process numbers and addresses. Error codes, exit statuses and signals tell kinds apart. The list
-//! is bounded, whatever the controllers write: the failures beyond it are counted as others.
+//! message apart from its numbers: measured values, times, counts, steps, process numbers and
+//! addresses differ from sample to sample. Only the numbers that name an error tell kinds apart:
+//! error codes, exit statuses, signals and lines of a source file. The list is bounded, whatever the
+//! controllers write: the failures beyond it are counted as others.
 
 use std::fmt;
 
@@ -17,15 +18,17 @@ const MOST_KINDS: usize = 16;
 /// Length of a message on a line of its own (characters).
 const LINE_CHARS: usize = 600;
 
-/// Words after a whole number that is a measured value or a count of steps: `12 ms`, `37 answers`.
+/// Words after a whole number that is a measured value or a count of steps, whatever stands before
+/// it: `error 12 ms`, `error 37 steps`.
 const UNITS: [&str; 24] = [
     "ns", "us", "µs", "ms", "s", "min", "h", "m", "mm", "km", "m/s", "m/s²", "km/h", "rad", "deg", "second", "seconds",
     "step", "steps", "answer", "answers", "frame", "frames", "samples",
 ];
-/// Words before a whole number that says when or where something happened: `step 12`, `pid=7`,
-/// `time_ns: 5`.
-const PLACES: [&str; 13] =
-    ["time", "timestamp", "t", "at", "step", "steps", "frame", "tick", "sample", "pid", "tid", "process", "thread"];
+/// Words before a whole number that names an error: `error 3`, `exit status: 5`, `line 12`.
+const NAMES: [&str; 12] =
+    ["error", "errno", "code", "status", "signal", "exit", "exception", "http", "line", "version", "case", "assertion"];
+/// Longest ending of the name of a source file, as in `main.cpp:12` (characters).
+const ENDING_CHARS: usize = 4;
 
 /// The failures of one kind.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -118,7 +121,7 @@ impl Failures {
     }
 }
 
-/// Returns a message with `#` for each number that differs from sample to sample.
+/// Returns a message with `#` for each number, except the numbers that name an error.
 fn shape(message: &str) -> String {
     let is_in_word = |c: char| c.is_alphanumeric() || c == '_';
     let (mut shape, mut rest) = (String::with_capacity(message.len()), message);
@@ -128,32 +131,48 @@ fn shape(message: &str) -> String {
         let end = number.find(|c: char| !is_in_word(c) && c != '.').unwrap_or(number.len());
         // A full stop ends the sentence, not the number.
         let (number, after) = number.split_at(number[..end].trim_end_matches('.').len());
-        // The digits of `mps2` are no number.
-        let is_number = !shape.ends_with(is_in_word);
-        shape.push_str(if is_number && differs(&shape, number, after) { "#" } else { number });
+        // The digits of `mps2` are no number; those of `track_7` are one.
+        let is_number = !shape.ends_with(|c: char| c.is_alphanumeric());
+        shape.push_str(if is_number && !names_error(&shape, number, after) { "#" } else { number });
         rest = after;
     }
     shape.push_str(rest);
     shape
 }
 
-/// Returns true if a number of a message differs from sample to sample: `number` stands between
-/// `before` and `after`, and may have its unit attached.
-fn differs(before: &str, number: &str, after: &str) -> bool {
-    let digits = number.trim_end_matches(|c: char| !c.is_ascii_digit());
+/// Returns true if a number of a message names an error: `number` stands between `before` and
+/// `after`, and may have its unit attached.
+fn names_error(before: &str, number: &str, after: &str) -> bool {
     let is_address = number.starts_with("0x");
+    let digits = number.trim_end_matches(|c: char| !c.is_ascii_digit());
     let is_value = number.contains('.') && digits.parse::<f64>().is_ok();
     let attached = &number[number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len())..];
     let next = after.strip_prefix([' ', '\u{a0}']).unwrap_or_default();
     let next = &next[..next.find(|c: char| !c.is_alphanumeric() && c != '/').unwrap_or(next.len())];
     let is_measured = UNITS.contains(&attached) || (attached.is_empty() && UNITS.contains(&next));
+    if is_value || is_measured {
+        return false;
+    }
     let separators = |c: char| c.is_whitespace() || "=:#([\"'\\-".contains(c);
-    let name = before.trim_end_matches(separators);
-    let name = name.rsplit(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default();
-    let is_place = name.split('_').any(|word| PLACES.iter().any(|place| word.eq_ignore_ascii_case(place)));
-    // Sanitizers write the process as `==7==`.
-    let is_process = before.ends_with("==") && after.starts_with("==");
-    is_address || is_value || is_measured || is_place || is_process
+    let named = before.trim_end_matches(separators);
+    let name = named.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+    // `error: 2 tracks are lost` counts.
+    let is_sentence = name.eq_ignore_ascii_case("error") && before[named.len()..].contains(':') && !next.is_empty();
+    let is_named = NAMES.iter().any(|word| name.eq_ignore_ascii_case(word)) && !is_sentence;
+    is_named || (!is_address && is_place_in_source(before))
+}
+
+/// Returns true if a text ends with the name of a source file and a colon: `main.cpp:`, or with its
+/// line, too: `main.cpp:12:`.
+fn is_place_in_source(before: &str) -> bool {
+    let Some(text) = before.strip_suffix(':') else { return false };
+    let text = text.trim_end_matches(|c: char| c.is_ascii_digit());
+    let text = text.strip_suffix(':').unwrap_or(text);
+    let file = text.rsplit(|c: char| c.is_whitespace() || "([\"'`".contains(c)).next().unwrap_or_default();
+    file.rsplit_once('.').is_some_and(|(stem, ending)| {
+        let is_ending = !ending.is_empty() && ending.len() <= ENDING_CHARS;
+        !stem.is_empty() && is_ending && ending.chars().all(|c| c.is_ascii_alphabetic())
+    })
 }
 
 #[cfg(test)]
@@ -193,6 +212,9 @@ mod tests {
             ("ended (signal: 6 (SIGABRT) (core dumped))", "ended (signal: 11 (SIGSEGV) (core dumped))"),
             ("failed with code -4.", "failed with code -5."),
             ("my.py, line 12, in step", "my.py, line 13, in step"),
+            ("panicked at src/lib.rs:12:5: lost", "panicked at src/lib.rs:13:5: lost"),
+            ("E12: no map", "E13: no map"),
+            ("errno=2", "errno=13"),
         ] {
             assert_ne!(shape(one), shape(other));
         }
@@ -204,6 +226,14 @@ mod tests {
             ("<Track object at 0x7f3a>", "<Track object at 0x7f4b>"),
             ("==71==ERROR: AddressSanitizer", "==72==ERROR: AddressSanitizer"),
             ("late by 40ms in step 3.", "late by 41ms in step 12."),
+            (r#"answered "2 tracks""#, r#"answered "1 tracks""#),
+            (r#"answered "3tracks""#, r#"answered "14tracks""#),
+            ("error: 2 tracks are lost", "error: 11 tracks are lost"),
+            ("track_7 is lost", "track_12 is lost"),
+            ("no object with id 4", "no object with id 5"),
+            ("index 4 is out of bounds for size 3", "index 7 is out of bounds for size 2"),
+            ("lost [1, 2, 3] of 4: 25%", "lost [4, 5, 6] of 8: 37%"),
+            ("a lateral error 3 m to the left", "a lateral error 4 m to the left"),
         ] {
             assert_eq!(shape(one), shape(other));
         }

@@ -101,7 +101,7 @@ def _row(name: str, counts: dict[str, Any], samples: int) -> tuple[str, ...]:
 class CampaignOptions(TypedDict, total=False):
     """The further keywords of :func:`campaign`. The help of ``closecall campaign`` explains them: they are its options."""
 
-    preset: str | None
+    preset: Literal["pr", "nightly"] | None
     until_certain: bool
     time_budget: str | None
     judge_seed: int | str | None

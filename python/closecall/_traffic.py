@@ -13,7 +13,7 @@ from ._scenario import whole
 
 PathLike = str | os.PathLike[str]
 #: The layout of a trajectory file. By default it is recognised by the content.
-Layout = Literal["ngsim", "highd", "commonroad", "csv", "in-car"]
+Layout = Literal["ngsim", "highd", "commonroad", "csv", "in-car", "sumo", "vissim", "i24", "openlabel", "osi"]
 
 
 class Rows(list[dict[str, Any]]):

@@ -279,7 +279,8 @@ fn parse(answer: &Bound<'_, PyAny>) -> PyResult<(f64, EgoState)> {
     Err(PyTypeError::new_err(format!("`step` answered {}, a `{found}`: it must be {ANSWERS}", answer.repr()?)))
 }
 
-/// Describes an exception: its type and message, then the traceback.
+/// Describes an exception: its type and message, then the traceback without them. An exception that no code of the controller has
+/// raised has no traceback.
 fn described(py: Python<'_>, error: &PyErr) -> String {
     if error.is_instance_of::<PyKeyboardInterrupt>(py) {
         return "the Python program has ended the run".to_owned();
@@ -290,8 +291,17 @@ fn described(py: Python<'_>, error: &PyErr) -> String {
         Ok(lines.extract::<Vec<String>>()?.concat())
     };
     match traceback() {
-        Ok(text) => format!("{error}\n{}", text.trim_end()),
+        Ok(text) => with_traceback(&error.to_string(), text.trim_end()),
         Err(_) => error.to_string(),
+    }
+}
+
+/// Returns the message of an exception, and below it its traceback. The last lines of a traceback are the message: they are left out.
+fn with_traceback(message: &str, traceback: &str) -> String {
+    let frames = traceback.strip_suffix(message).filter(|frames| frames.is_empty() || frames.ends_with('\n'));
+    match frames.unwrap_or(traceback).trim_end() {
+        "" => message.to_owned(),
+        frames => format!("{message}\n{frames}"),
     }
 }
 

@@ -125,6 +125,10 @@ def test_a_failing_controller_costs_its_sample_only(tmp_path: Path) -> None:
         "`step` answered the state `driving`: it is one of following",
     ]:
         assert part in messages, part
+    # Each message says once what was wrong.
+    for row in failed:
+        for part in ("ZeroDivisionError: one in five", "`step` answered"):
+            assert row["error_message"].count(part) <= 1, row["error_message"]
     # The command line can read the folder, and says why it cannot run the samples again.
     again = command("replay", tmp_path / "out", "0")
     assert again.returncode == 5 and "controller of a Python program" in again.stderr

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pyarrow
@@ -86,6 +87,14 @@ def test_the_keywords_of_a_campaign_are_the_options_of_the_command() -> None:
     explicit = {"samples", "controller", "arms", "paired", "seed", "design", "sensors", "jobs", "out", "resume", "gate"}
     settings_of_scenarios, of_the_command_line = {"set"}, {"help", "format", "no_out", "event", "guide", "relative_width"}
     assert set(_campaign.CampaignOptions.__annotations__) == options - explicit - settings_of_scenarios - of_the_command_line
+
+
+def test_the_words_that_a_type_checker_knows_are_those_of_the_command() -> None:
+    preset = get_type_hints(_campaign.CampaignOptions)["preset"]
+    for words, option, known in [(["campaign", SCENARIO], "--preset", get_args(preset)[0]), (["traffic", "fit", "a.csv"], "--layout", _traffic.Layout)]:
+        refused = command(*words, option, "no-such").stderr
+        allowed = re.search(r"possible values: ([a-z0-9, -]+)]", refused)
+        assert allowed is not None and set(allowed.group(1).split(", ")) == set(get_args(known)), refused
 
 
 def findings(file: Path) -> dict[int, str]:

@@ -1,24 +1,33 @@
 //! The progress of a long command as lines of text, for a standard error that is no terminal, such
 //! as the log of a CI job.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
+use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// Time between two lines. CI servers end a job that is silent for ten minutes.
 const INTERVAL: Duration = Duration::from_secs(30);
+/// Stack of the thread that prints (bytes). It only formats a line; the usual 2 MiB are not needed.
+const STACK_BYTES: usize = 256 << 10;
+
+/// Number of heartbeats of a part of a command. While there is one, the heartbeat of the whole
+/// command is silent.
+static OF_PARTS: AtomicUsize = AtomicUsize::new(0);
 
 /// Prints a line about the progress every 30 s until it is dropped.
 #[derive(Debug)]
 pub struct Heartbeat {
+    /// `None` if no thread could be started: the work does not depend on it.
     running: Option<(Sender<()>, JoinHandle<()>)>,
+    is_of_part: bool,
 }
 
 impl Heartbeat {
     /// Starts to `print` lines. `progress` returns the number of finished samples, and the number
     /// of all samples.
     pub fn start(progress: impl Fn() -> [u64; 2] + Send + 'static, print: impl Fn(&str) + Send + 'static) -> Self {
-        Self::every((INTERVAL, "samples"), progress, print)
+        Self::of("samples", progress, print)
     }
 
     /// Starts to `print` lines about something else than samples, such as `fits`.
@@ -27,28 +36,58 @@ impl Heartbeat {
         progress: impl Fn() -> [u64; 2] + Send + 'static,
         print: impl Fn(&str) + Send + 'static,
     ) -> Self {
-        Self::every((INTERVAL, unit), progress, print)
+        Self::every(INTERVAL, move |elapsed| line(progress(), unit, elapsed), print)
+    }
+
+    /// Starts to `print` lines about work whose length is not known, such as `reading traffic.csv`.
+    pub fn during(work: String, print: impl Fn(&str) + Send + 'static) -> Self {
+        Self::every(INTERVAL, move |elapsed| line_during(&work, elapsed), print)
+    }
+
+    /// Starts to `print` lines about a whole command, while no other heartbeat prints about a part of
+    /// it.
+    pub fn of_command(command: String, print: impl Fn(&str) + Send + 'static) -> Self {
+        Self::of_command_every(INTERVAL, command, print)
+    }
+
+    fn of_command_every(interval: Duration, command: String, print: impl Fn(&str) + Send + 'static) -> Self {
+        let line = move |elapsed| (OF_PARTS.load(Ordering::Relaxed) == 0).then(|| line_during(&command, elapsed));
+        Self { running: beat(interval, line, print), is_of_part: false }
     }
 
     fn every(
-        (interval, unit): (Duration, &'static str),
-        progress: impl Fn() -> [u64; 2] + Send + 'static,
+        interval: Duration,
+        line: impl Fn(Duration) -> String + Send + 'static,
         print: impl Fn(&str) + Send + 'static,
     ) -> Self {
-        let (sender, receiver) = channel();
-        let started = Instant::now();
-        let thread = std::thread::spawn(move || {
-            while receiver.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
-                let [done, all] = progress();
-                print(&line([done, all], unit, started.elapsed()));
-            }
-        });
-        Self { running: Some((sender, thread)) }
+        OF_PARTS.fetch_add(1, Ordering::Relaxed);
+        Self { running: beat(interval, move |elapsed| Some(line(elapsed)), print), is_of_part: true }
     }
+}
+
+/// Starts the thread that prints a line after each interval, if there is one then.
+fn beat(
+    interval: Duration,
+    line: impl Fn(Duration) -> Option<String> + Send + 'static,
+    print: impl Fn(&str) + Send + 'static,
+) -> Option<(Sender<()>, JoinHandle<()>)> {
+    let (sender, receiver) = channel();
+    let started = Instant::now();
+    let thread = Builder::new().stack_size(STACK_BYTES).spawn(move || {
+        while receiver.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
+            if let Some(line) = line(started.elapsed()) {
+                print(&line);
+            }
+        }
+    });
+    Some((sender, thread.ok()?))
 }
 
 impl Drop for Heartbeat {
     fn drop(&mut self) {
+        if self.is_of_part {
+            OF_PARTS.fetch_sub(1, Ordering::Relaxed);
+        }
         if let Some((sender, thread)) = self.running.take() {
             drop(sender);
             drop(thread.join());
@@ -88,9 +127,13 @@ fn line([done, all]: [u64; 2], unit: &str, elapsed: Duration) -> String {
     format!("{done} of {all} {unit} after {}{left}", duration_text(elapsed_s))
 }
 
+fn line_during(work: &str, elapsed: Duration) -> String {
+    format!("{work}: {} so far", duration_text(elapsed.as_secs_f64()))
+}
+
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc::channel;
+    use std::sync::mpsc::{Receiver, channel};
 
     use super::*;
 
@@ -126,10 +169,32 @@ mod tests {
     fn lines_come_until_the_heartbeat_ends() {
         let (sender, lines) = channel();
         let print = move |line: &str| drop(sender.send(line.to_owned()));
-        let heartbeat = Heartbeat::every((Duration::from_millis(1), "samples"), || [0, 5], print);
+        let heartbeat = Heartbeat::every(Duration::from_millis(1), |elapsed| line([0, 5], "samples", elapsed), print);
         assert!(lines.recv().unwrap().starts_with("0 of 5 samples"));
         drop(heartbeat);
         while lines.try_recv().is_ok() {}
         assert!(lines.recv().is_err(), "the thread has ended");
+    }
+
+    #[test]
+    fn the_heartbeat_of_a_command_is_silent_while_a_part_of_it_has_its_own() {
+        assert_eq!(
+            line_during("closecall minimize out 0", Duration::from_secs(30)),
+            "closecall minimize out 0: 30 s so far"
+        );
+        let (sender, lines): (_, Receiver<String>) = channel();
+        let print = move |line: &str| drop(sender.send(line.to_owned()));
+        let of_command =
+            Heartbeat::of_command_every(Duration::from_millis(1), "closecall explain out".to_owned(), print);
+        assert!(lines.recv().unwrap().starts_with("closecall explain out: 0 s so far"));
+        let part = Heartbeat::during("reading traffic.csv".to_owned(), |_| ());
+        // A line may have been on its way.
+        std::thread::sleep(Duration::from_millis(50));
+        while lines.try_recv().is_ok() {}
+        std::thread::sleep(Duration::from_millis(50));
+        assert!(lines.try_recv().is_err(), "two heartbeats print");
+        drop(part);
+        assert!(lines.recv().is_ok(), "the part has ended");
+        drop(of_command);
     }
 }

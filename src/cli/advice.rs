@@ -23,7 +23,7 @@ use miette::Diagnostic;
 
 use super::CliError;
 
-const ALL_OPTIONS: &str = "see `closecall --help`";
+const ALL_OPTIONS: &str = "the same command with --help lists its options";
 const OTHER_FOLDER: &str = "name a folder with --out DIR, or keep no results with --no-out";
 const RESUME: &str = "the same command with --resume goes on with the campaign";
 
@@ -41,7 +41,7 @@ fn advice(error: &CliError) -> Option<&'static str> {
         CliError::Campaign(error) | CliError::Merge(MergeError::Campaign(error)) => of_campaign(error),
         CliError::Merge(MergeError::NotAPart { .. }) => Some("`closecall campaign … --partition K/N` runs a part"),
         CliError::Merge(MergeError::Incomplete { .. } | MergeError::Rare(RareError::MissingRun { .. })) => Some(RESUME),
-        CliError::Saved(error) | CliError::Causes(CausesError::Saved(error)) => of_saved(error).or(Some(ALL_OPTIONS)),
+        CliError::Saved(error) | CliError::Causes(CausesError::Saved(error)) => of_saved(error),
         CliError::Report(ReportError::Folder(error)) => of_folder(error),
         CliError::Report(ReportError::Saved(error)) => of_saved(error),
         CliError::Causes(CausesError::NoFailure { .. }) => {
@@ -68,8 +68,9 @@ fn advice(error: &CliError) -> Option<&'static str> {
         CliError::Boundary(BoundaryError::Count { .. }) => Some("--along A B names both"),
         CliError::Boundary(BoundaryError::NoBaseline { .. }) => Some("--controller NAME names the controller"),
         CliError::Boundary(_) => Some("see `closecall study boundary --help`"),
-        CliError::Usage { .. } | CliError::Gates(_) | CliError::Arms(_) | CliError::Plan(_) | CliError::Causes(_) => {
-            Some(ALL_OPTIONS)
+        // Another message is about a file or a result: no option helps.
+        CliError::Usage { .. } | CliError::Gates(_) | CliError::Arms(_) | CliError::Plan(_) => {
+            error.to_string().contains("--").then_some(ALL_OPTIONS)
         }
         _ => None,
     }

@@ -11,7 +11,7 @@ use closecall_traffic::atomic::write_file;
 use super::CliError;
 use super::args::{Format, ReadFiles};
 use super::help::{examples, heading};
-use super::output::{outln, print_text};
+use super::output::{outln, print_text, print_written};
 use super::progress::watched;
 use super::protect::protect;
 use crate::exit_code::ExitCode;
@@ -61,6 +61,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
         let command = format!("closecall traffic calibrate --model {}", model.name());
         let member = calibration::member(&result, &data, &command);
         write_file(path, |file| file.write_all(member.as_bytes()))?;
+        print_written(path);
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(calibration::json(&result, &data), None, None)),

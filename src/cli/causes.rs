@@ -27,7 +27,7 @@ use super::actions::command_for;
 use super::advice::to_provide;
 use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
-use super::output::{outln, print_error, print_text, print_written};
+use super::output::{during, outln, print_error, print_text, print_written};
 use super::protect::{of_campaign, protect};
 use super::saved::SavedArgs;
 use crate::exit_code::ExitCode;
@@ -65,7 +65,10 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         None => saved.folder().complete_records()?.try_for_each(|record| record.map(drop))?,
         Some(_) => saved.folder().check_journal()?,
     }
-    let (explanations, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
+    let explained = during(format!("explaining {}", args.dir.display()), || {
+        explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)
+    });
+    let (explanations, failures) = explained?;
     match write_causes(&saved, &failures, command_for) {
         Ok(paths) => paths.iter().for_each(|path| print_written(path)),
         // The explanation does not depend on it.
@@ -144,11 +147,12 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     let of_nearest = search.as_ref().map(|_| PathBuf::from(format!("{}-nearest.toml", case.file.config().name)));
     let paths = output_files(&case, args.output.as_deref().or(of_nearest.as_deref()))?;
     protect(&of_campaign(&args.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
-    let minimized = match search {
-        Some(search) => search.run(&saved, args.runs.unwrap_or(NEAREST_RUNS))?,
-        None => minimize_sample(&saved, &case)?,
-    };
+    let minimized = during(format!("minimizing a failure of {}", args.dir.display()), || match search {
+        Some(search) => search.run(&saved, args.runs.unwrap_or(NEAREST_RUNS)),
+        None => minimize_sample(&saved, &case),
+    })?;
     let files = write_files(&case, &minimized, &paths, command_for)?;
+    [Some(&files.failing), files.twin.as_ref()].into_iter().flatten().for_each(|path| print_written(path));
     match args.format {
         Format::Json => {
             outln!("{:#}", stamped(json!({ "minimized": minimized, "files": files }), Some(minimized.seed), None))
@@ -199,7 +203,8 @@ pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
     let MapArgs { speed_mps, closing_kmh, detection_m, front_thw_s, .. } = args;
     let (closing_kmh, detection_m, front_thw_s) = (closing_kmh.clone(), detection_m.clone(), front_thw_s.clone());
     let grid = MapGrid { speed_mps: *speed_mps, closing_kmh, detection_m, front_thw_s };
-    let points = compute_map(&grid, &args.controller, &args.set.settings).map_err(CausesError::from)?;
+    let points = during("computing the map".to_owned(), || compute_map(&grid, &args.controller, &args.set.settings));
+    let points = points.map_err(CausesError::from)?;
     if let Some(out) = &args.out {
         write_map(out, &points)?.iter().for_each(|path| print_written(path));
     }

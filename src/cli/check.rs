@@ -49,6 +49,13 @@ pub(super) struct CheckArgs {
     format: Format,
 }
 
+impl CheckArgs {
+    /// Returns true if the command waits for changes of a file.
+    pub(super) const fn is_watching(&self) -> bool {
+        self.watching.watch
+    }
+}
+
 /// Refuses the options about samples unless a file is watched: a check runs none.
 fn only_with_watch(arg: Arg) -> Arg {
     match arg.get_id().as_str() {

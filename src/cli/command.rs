@@ -6,6 +6,7 @@ use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 use std::path::PathBuf;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
@@ -18,7 +19,7 @@ use textwrap::{WordSeparator, WordSplitter};
 use super::backend::choose_backend;
 use super::groups::{Study, Tool, Traffic};
 use super::help::heading;
-use super::output::{announce, print_error, print_failure};
+use super::output::{announce, command_heartbeat, print_error, print_failure};
 use super::terminal::error_columns;
 use super::version::{BUILD, name_commit};
 use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
@@ -37,9 +38,10 @@ struct Cli {
 }
 
 /// The commands that may run the network of a camera, each as the words that name it.
-const WITH_NETWORK: [&[&str]; 23] = [
+const WITH_NETWORK: [&[&str]; 20] = [
     &["run"],
     &["campaign"],
+    &["compare"],
     &["replay"],
     &["explain"],
     &["minimize"],
@@ -48,20 +50,19 @@ const WITH_NETWORK: [&[&str]; 23] = [
     &["check"],
     &["traffic", "aerial"],
     &["traffic", "chain"],
-    &["traffic", "calibrate"],
-    &["traffic", "paper"],
     &["traffic", "reenact"],
     &["traffic", "record"],
-    &["traffic", "sample"],
     &["study", "anchor"],
     &["study", "boundary"],
     &["study", "frontier"],
-    &["study", "map"],
     &["study", "sensitivity"],
     &["study", "sensors"],
     &["tool", "export"],
     &["tool", "merge"],
 ];
+
+/// The commands that run a network only with another option, each with this option.
+const NETWORK_NEEDS: [(&str, &str); 2] = [("check", "watch"), ("compare", "search")];
 
 /// The option for the shared library of ONNX Runtime.
 const ONNXRUNTIME: &str = "onnxruntime";
@@ -93,6 +94,16 @@ fn onnxruntime(matches: &clap::ArgMatches) -> Option<PathBuf> {
         Some((_, below)) => onnxruntime(below),
         None => matches.try_get_one::<PathBuf>(ONNXRUNTIME).ok().flatten().cloned(),
     }
+}
+
+/// Returns why a command line that names the shared library of ONNX Runtime runs no network, if so.
+/// A variable of the environment is for all commands.
+fn runs_no_network(matches: &clap::ArgMatches) -> Option<String> {
+    let (command, below) = matches.subcommand()?;
+    let (_, needed) = NETWORK_NEEDS.into_iter().find(|(name, _)| *name == command)?;
+    let is_named = below.value_source(ONNXRUNTIME) == Some(ValueSource::CommandLine);
+    (is_named && !below.get_flag(needed))
+        .then(|| format!("--{ONNXRUNTIME} needs --{needed}: `closecall {command}` runs no network without it"))
 }
 
 /// The end of the program's help.
@@ -214,6 +225,9 @@ fn parse(arguments: &[std::ffi::OsString]) -> Result<(Command, Option<PathBuf>),
     let mut command = command();
     let matches = command.try_get_matches_from_mut(arguments).map_err(|error| plain_words(error, arguments))?;
     let onnxruntime = onnxruntime(&matches);
+    if let Some(message) = runs_no_network(&matches) {
+        return Err(command.error(ErrorKind::MissingRequiredArgument, message));
+    }
     let cli = Cli::from_arg_matches(&matches).map_err(|error| plain_words(error.format(&mut command), arguments))?;
     Ok((cli.command, onnxruntime))
 }
@@ -325,7 +339,9 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     if !matches!(command, Command::Host { .. }) {
         choose_backend(onnxruntime.as_deref());
     }
+    let heartbeat = has_end(&command).then(command_heartbeat).flatten();
     let result = dispatch(command);
+    drop(heartbeat);
     end_all();
     remove_unpacked();
     match result {
@@ -351,6 +367,15 @@ fn wrong_stack() -> Option<String> {
     let (least, most) = (STACK_BYTES.start(), STACK_BYTES.end());
     (!STACK_BYTES.contains(&bytes))
         .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
+}
+
+/// Returns true if a command ends by itself: it serves nobody, and waits for no change of a file.
+const fn has_end(command: &Command) -> bool {
+    match command {
+        Command::View(_) | Command::Host { .. } => false,
+        Command::Check(args) => !args.is_watching(),
+        _ => true,
+    }
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {

@@ -10,7 +10,7 @@ use closecall_report::traffic::drift::DriftText;
 use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
-use super::output::{outln, print_text, warn};
+use super::output::{during, outln, print_text, warn};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic drift`.
@@ -39,7 +39,7 @@ pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
     let fitted = Fitted::read(&args.fitted)?;
     let data_sets = args.data.read_all()?;
     let are_lanes_in_doubt = data_sets.iter().any(|data| data.doubts_lanes);
-    let drift = compare(&fitted, &data_sets, args.seed);
+    let drift = during("comparing distributions".to_owned(), || compare(&fitted, &data_sets, args.seed));
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(drift), None, None)),
         Format::Human => print_text(DriftText(&drift)),

@@ -33,7 +33,7 @@ use tempfile::TempDir;
 
 use super::CliError;
 use super::actions::command_for;
-use super::output::{outln, print_error, print_written};
+use super::output::{during, outln, print_error, print_written};
 use super::page_server::{Answer, Method, PageServer};
 use super::view_error::ViewError;
 use super::viewer::Viewer;
@@ -61,7 +61,8 @@ pub(super) fn export(saved: &SavedCampaign, path: &Path) -> Result<(), CliError>
             path.display()
         ));
     }
-    let page = explorer_page(saved, &PagePlace::File(to_folder), command_for)?;
+    let place = PagePlace::File(to_folder);
+    let page = during("making the page".to_owned(), || explorer_page(saved, &place, command_for))?;
     write_file(path, |file| file.write_all(shown(&page).as_bytes()))?;
     print_written(path);
     Ok(())

@@ -18,16 +18,50 @@ use super::argument::Argument;
 /// The begin of a field's name whose keywords stand beside the others.
 const GROUP: &str = "..";
 
-/// The words of serde for the kinds of a value, and those of a user.
-const KINDS: [(&str, &str); 7] = [
-    ("invalid type: ", ""),
-    ("invalid value: ", ""),
-    ("unknown variant ", ""),
+/// The words of serde for what is expected, and those of a user.
+const EXPECTED: [(&str, &str); 10] = [
     ("u64", "a whole number, 0 or more"),
+    ("u32", "a whole number, 0 or more"),
+    ("u16", "a whole number, 0 or more"),
+    ("usize", "a whole number, 0 or more"),
+    ("f64", "a number"),
     ("a sequence", "a list"),
-    ("a boolean", "true or false"),
+    ("a boolean", "True or False"),
     ("path string", "a path"),
+    ("a string", "a text"),
+    ("string or map", "a text"),
 ];
+/// The words of serde for the value that is there, and those of a user. A word that a value follows
+/// is left out.
+const GIVEN: [(&str, &str); 9] = [
+    ("integer ", ""),
+    ("floating point ", ""),
+    ("string ", ""),
+    ("boolean `true`", "True"),
+    ("boolean `false`", "False"),
+    ("null", "None"),
+    ("unit value", "None"),
+    ("map", "a dictionary"),
+    ("sequence", "a list"),
+];
+
+/// Returns a message of serde in the words of a user: which value is not allowed, and what is
+/// expected.
+fn plain(message: &str) -> String {
+    if let Some(unknown) = message.strip_prefix("unknown variant ") {
+        return unknown.to_owned();
+    }
+    let types = ["invalid type: ", "invalid value: "];
+    let wrong =
+        types.iter().find_map(|kind| message.strip_prefix(*kind)).and_then(|rest| rest.rsplit_once(", expected "));
+    let Some((given, expected)) = wrong else { return message.to_owned() };
+    let given = GIVEN.iter().find_map(|(word, plain)| Some(format!("{plain}{}", given.strip_prefix(*word)?)));
+    let expected = EXPECTED.iter().find(|(word, _)| *word == expected).map_or(expected, |(_, plain)| *plain);
+    match given {
+        Some(given) => format!("{given} is not allowed: expected {expected}"),
+        None => format!("expected {expected}"),
+    }
+}
 
 /// Returns the arguments of a command that the keywords, a JSON object, state.
 pub(super) fn arguments<T: Args + DeserializeOwned>(keywords: &str) -> Result<T, CliError> {
@@ -102,10 +136,8 @@ impl<'de> MapAccess<'de> for Fields<'_> {
             return seed.deserialize(Group(self.keywords));
         }
         let value = self.keywords.remove(self.field).unwrap_or_default();
-        seed.deserialize(value).map_err(|error| {
-            let why = KINDS.iter().fold(error.to_string(), |text, (kind, word)| text.replace(kind, word));
-            Error::custom(format!("{}=: {why}", self.field))
-        })
+        seed.deserialize(value)
+            .map_err(|error| Error::custom(format!("{}=: {}", self.field, plain(&error.to_string()))))
     }
 }
 
@@ -156,9 +188,16 @@ mod tests {
     #[test]
     fn a_wrong_keyword_is_named() {
         for (keywords, message) in [
-            (r#"{"file": "a", "most": "three"}"#, "most=: string \"three\", expected a whole number, 0 or more"),
-            (r#"{"file": "a", "most": -1}"#, "most=: integer `-1`, expected a whole number, 0 or more"),
-            (r#"{"file": "a", "is_strict": 1}"#, "is_strict=: integer `1`, expected true or false"),
+            (
+                r#"{"file": "a", "most": "three"}"#,
+                "most=: \"three\" is not allowed: expected a whole number, 0 or more",
+            ),
+            (r#"{"file": "a", "most": -1}"#, "most=: `-1` is not allowed: expected a whole number, 0 or more"),
+            (r#"{"file": "a", "is_strict": 1}"#, "is_strict=: `1` is not allowed: expected True or False"),
+            (r#"{"file": "a", "most": 1.5}"#, "most=: `1.5` is not allowed: expected a whole number, 0 or more"),
+            (r#"{"file": "a", "most": true}"#, "most=: True is not allowed: expected a whole number, 0 or more"),
+            (r#"{"file": 3}"#, "file=: `3` is not allowed: expected a text"),
+            (r#"{"file": ["a, expected u64"]}"#, "file=: a list is not allowed: expected a text"),
             (r#"{"file": "a", "most": 1, "share": 0.5}"#, "share= cannot be used with most="),
             (r#"{"file": "a", "mots": 1}"#, "there is no keyword `mots`"),
             (r#"{"file": "a", "..limits": 1}"#, "there is no keyword `..limits`"),

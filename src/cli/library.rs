@@ -30,9 +30,9 @@ const FAULT_TAG: &str = "fault";
     "closecall list --format json > library.json",
 ]))]
 pub(super) struct ListArgs {
-    /// Describe these scenarios in full: part of their names or one of their tags, in any case,
-    /// `faults`, or the `members` of the driver ensemble [default: a line for each scenario without
-    /// a fault]
+    /// Describe these scenarios in full: part of their names, one of their tags or requirements, in
+    /// any case, `faults`, or the `members` of the driver ensemble [default: a line for each scenario
+    /// without a fault]
     what: Option<String>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -54,7 +54,10 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
         (Format::Human, Some(what)) => {
             let is_meant = |entry: &&LibraryEntry| match what {
                 FAULTS => is_fault(entry),
-                _ => entry.name.contains(what) || entry.tags.iter().any(|tag| tag.to_lowercase() == what),
+                _ => {
+                    let mut words = entry.tags.iter().chain(&entry.requirements);
+                    entry.name.contains(what) || words.any(|word| word.to_lowercase() == what)
+                }
             };
             let meant: Vec<&LibraryEntry> = listed.iter().filter(is_meant).collect();
             if meant.is_empty() && members.iter().any(|member| member.name == what) {
@@ -64,7 +67,7 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
             }
             if meant.is_empty() {
                 return Err(CliError::usage(format!(
-                    "no scenario has `{what}` in its name or as a tag: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"
+                    "no scenario has `{what}` in its name, as a tag or as a requirement: `closecall list` names all, `{FAULTS}` and `{MEMBERS}` are groups"
                 )));
             }
             meant.into_iter().for_each(|scenario| print_text(format_args!("{}\n", scenario)));

@@ -21,7 +21,7 @@ use super::args::Format;
 use super::fast_samples::FastParts;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{outln, print_error, print_text};
+use super::output::{during, outln, print_error, print_text};
 use super::rare::{Rare, RareArgs};
 use super::results::{ArtifactArgs, print_results, remember, selection};
 use super::saved::TrustArgs;
@@ -109,7 +109,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let fast_parts = FastParts::open(&args.parts)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
-    let merged = parts.merge(&works, &args.out, session::arguments(), args.resume)?;
+    let merged = during("merging".to_owned(), || parts.merge(&works, &args.out, session::arguments(), args.resume))?;
     // Samples are run again to record them. The merged folder is trusted as its parts are.
     let selection = if is_trusted { selection(args.record) } else { Selection::default() };
     if is_trusted {

@@ -77,13 +77,13 @@ fn git_url(text: &str) -> Result<String, String> {
     }
 }
 
-/// Reads a commit, tag or branch.
+/// Reads a commit or tag: a branch would install another program each time.
 fn git_revision(text: &str) -> Result<String, String> {
     let is_name = |letter: char| letter.is_ascii_alphanumeric() || "._/-+".contains(letter);
     if !text.is_empty() && !text.starts_with('-') && !text.contains("..") && text.chars().all(is_name) {
         Ok(text.to_owned())
     } else {
-        Err("the name of a commit, tag or branch is needed, such as v0.1.0".to_owned())
+        Err("the name of a commit or tag is needed, such as v0.1.0".to_owned())
     }
 }
 

@@ -109,20 +109,34 @@ pub(super) fn heartbeat(bar: &ProgressBar) -> Option<Heartbeat> {
         .then(|| Heartbeat::start(progress, |line| print_error(format_args!("{line}\n"))))
 }
 
-/// Time between two turns of the sign that a file is being read.
+/// Time between two turns of the sign that work goes on.
 const TURN: Duration = Duration::from_millis(200);
+
+/// Starts to print lines about a command whose parts may say nothing. A terminal has none.
+pub(super) fn command_heartbeat() -> Option<Heartbeat> {
+    (!session::is_active() && !stderr().is_terminal())
+        .then(|| Heartbeat::of_command(command_line(), |line| print_error(format_args!("{line}\n"))))
+}
 
 /// Does `work` on a file. A terminal shows the name of the file and the time since the begin.
 pub(super) fn reading<T>(path: &Path, work: impl FnOnce() -> T) -> T {
+    during(format!("reading {}", path.display()), work)
+}
+
+/// Does `work` whose length is not known. A terminal shows its name and the time since the begin;
+/// elsewhere a line does so every 30 s.
+pub(super) fn during<T>(name: String, work: impl FnOnce() -> T) -> T {
     let spinner = ProgressBar::new_spinner();
     if session::is_active() {
         spinner.set_draw_target(ProgressDrawTarget::hidden());
     }
-    if let Ok(style) = ProgressStyle::with_template("{spinner} reading {msg}, {elapsed}") {
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {
         spinner.set_style(style);
     }
-    spinner.set_message(path.display().to_string());
+    spinner.set_message(shown(&name).into_owned());
     spinner.enable_steady_tick(TURN);
+    let _heartbeat = (!session::is_active() && !stderr().is_terminal())
+        .then(|| Heartbeat::during(name, |line| print_error(format_args!("{line}\n"))));
     let done = work();
     spinner.finish_and_clear();
     done

@@ -15,7 +15,7 @@ use closecall_traffic::atomic::write_file;
 use super::CliError;
 use super::args::FilesArgs;
 use super::help::{examples, heading};
-use super::output::{print_written, write_charts};
+use super::output::{during, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::robustness::refused;
 use crate::exit_code::ExitCode;
@@ -56,7 +56,10 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = match args.repetitions {
         0 => None,
-        _ => robustness(&args.data.files, args.data.read.options(), &setup, |_, _| {}).map_err(refused)?,
+        _ => during("studying the robustness".to_owned(), || {
+            robustness(&args.data.files, args.data.read.options(), &setup, |_, _| {})
+        })
+        .map_err(refused)?,
     };
     let paper = Paper::new(&recorded, studied.as_ref(), args.speed_limit_mps)?;
     let paths: Vec<PathBuf> = paper.pictures.iter().map(|picture| args.output.join(&picture.name)).collect();

@@ -16,7 +16,7 @@ use super::args::SetArgs;
 use super::arms::{ArmArgs, ComparisonArgs};
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::{outln, print_written};
+use super::output::{during, outln, print_written};
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
 use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
@@ -117,5 +117,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
 
 fn films(scenario: &Scenario, key: RunKey, arms: &[Arm]) -> Result<Vec<Film>, CliError> {
     check_backend_of(scenario, arms)?;
-    film_arms(scenario, key, arms, Level::Objects).map_err(|source| CliError::Sample { sample: key.sample, source })
+    let work = format!("running sample {} of {}", key.sample, scenario.name);
+    during(work, || film_arms(scenario, key, arms, Level::Objects))
+        .map_err(|source| CliError::Sample { sample: key.sample, source })
 }

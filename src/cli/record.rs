@@ -17,6 +17,7 @@ use super::args::SimulationArgs;
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
+use super::progress::watched;
 use super::protect::{of_scenario, protect};
 use crate::exit_code::ExitCode;
 
@@ -107,12 +108,15 @@ fn each_sample<R: Observer>(
 ) -> Result<(), CliError> {
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.samples };
     let arm = args.sim.arm.arm(file.config().function)?;
-    for sample in 0..args.samples {
-        let fail = |source| CliError::Sample { sample, source };
-        let scenario = concrete(file, sampling, sample).map_err(fail)?;
-        check_backend_of(&scenario, std::slice::from_ref(&arm))?;
-        begin(recorder, &scenario);
-        run_guarded(&scenario, RunKey { seed: args.sim.seed, sample }, &arm, recorder).map_err(fail)?;
-    }
-    Ok(())
+    watched("samples", |on_progress| {
+        for sample in 0..args.samples {
+            on_progress([sample, args.samples]);
+            let fail = |source| CliError::Sample { sample, source };
+            let scenario = concrete(file, sampling, sample).map_err(fail)?;
+            check_backend_of(&scenario, std::slice::from_ref(&arm))?;
+            begin(recorder, &scenario);
+            run_guarded(&scenario, RunKey { seed: args.sim.seed, sample }, &arm, recorder).map_err(fail)?;
+        }
+        Ok(())
+    })
 }

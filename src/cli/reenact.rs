@@ -19,7 +19,7 @@ use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
 use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
-use super::output::{made_by, outln, print_text};
+use super::output::{made_by, outln, print_text, print_written};
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
@@ -97,8 +97,10 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     if let Some(path) = &args.watch.record {
         write_recording(path, &films)?;
     }
+    args.watch.print_files();
     if let Some(path) = &args.output {
         write_file(path, |written| written.write_all(made_by(&args.file, &file).as_bytes()))?;
+        print_written(path);
     }
     let reenactment = Reenactment { encounter: &found, comparison: &comparison, films: &films, outcome: &outcome };
     match args.format {

@@ -13,7 +13,7 @@ use serde_json::json;
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{outln, print_written};
+use super::output::{during, outln, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall tool render`.
@@ -67,7 +67,8 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
     let set = if args.set == "training" { Set::Training } else { Set::HeldOut };
     let (scenes, seed) = (args.scenes, args.seed);
     if args.aerial {
-        let summary = render_aerial_dataset(&AerialDatasetOptions { set, pictures: scenes, seed }, &args.output)?;
+        let options = AerialDatasetOptions { set, pictures: scenes, seed };
+        let summary = during("rendering aerial images".to_owned(), || render_aerial_dataset(&options, &args.output))?;
         match args.format {
             Format::Json => outln!("{:#}", stamped(json!(summary), Some(seed), None)),
             Format::Human => outln!("{summary}"),
@@ -77,7 +78,7 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
     }
     let content = if args.crops { Content::Crops } else { Content::Images };
     let options = DatasetOptions { set, content, scenes, seed, looks: CameraLooks::default(), vehicles: args.vehicles };
-    let summary = render_dataset(&options, &args.output)?;
+    let summary = during("rendering images".to_owned(), || render_dataset(&options, &args.output))?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),
         Format::Human => {

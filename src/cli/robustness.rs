@@ -13,7 +13,7 @@ use closecall_traffic::words::counted;
 use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
-use super::output::{outln, print_error, print_text, write_charts};
+use super::output::{during, outln, print_error, print_text, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
@@ -47,8 +47,10 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
-    let studied = study(&args.data.files, args.data.read.options(), &setup, |path, warning| {
-        print_error(format_args!("warning: {}: {warning}\n", path.display()));
+    let studied = during("studying the robustness".to_owned(), || {
+        study(&args.data.files, args.data.read.options(), &setup, |path, warning| {
+            print_error(format_args!("warning: {}: {warning}\n", path.display()));
+        })
     });
     let studied = studied.map_err(refused)?;
     let Some((_, study)) = studied else { return Ok(ExitCode::Pass) };

@@ -15,7 +15,7 @@ use closecall_traffic::atomic::write_file;
 use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
 use super::help::{examples, heading};
-use super::output::{made_by, outln, print_text, print_written, write_charts};
+use super::output::{during, made_by, outln, print_text, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::chosen_by;
 use crate::exit_code::ExitCode;
@@ -116,7 +116,8 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     variation.steps().last().map(scenario_of).transpose()?;
     for (number, value) in (1..).zip(variation.steps()) {
         let step = scenario_of(value)?;
-        let done = run_step(&found, (value.label(), Some(value.value)), &step, args.seed);
+        let work = format!("running step {number} of {}", args.steps);
+        let done = during(work, || run_step(&found, (value.label(), Some(value.value)), &step, args.seed));
         let done = done.map_err(|error| of_step(error, number))?;
         films.extend(done.film);
         all.runs.push(done.run);
@@ -134,7 +135,9 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         write_recording(&rrd, &films)?;
         print_written(&rrd);
         for (name, file) in &files {
-            write_file(&folder.join(name), |written| written.write_all(made_by(&args.file, file).as_bytes()))?;
+            let path = folder.join(name);
+            write_file(&path, |written| written.write_all(made_by(&args.file, file).as_bytes()))?;
+            print_written(&path);
         }
     }
     match args.format {

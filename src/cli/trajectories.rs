@@ -25,7 +25,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes};
 use super::argument::Argument;
 use super::help::{examples, heading};
-use super::output::{command_line, outln, print_text, print_written, reading, warn, write_charts};
+use super::output::{command_line, during, outln, print_text, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
@@ -306,7 +306,8 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     let data_sets = args.data.read_all()?;
-    let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
+    let fit = if args.correlations { correlated } else { fit_distributions };
+    let fitted = during("fitting distributions".to_owned(), || fit(&data_sets, args.seed));
     if fitted.fitted.is_empty() {
         if let Format::Json = args.format {
             outln!("{:#}", stamped(json::fitted(&fitted), None, None));

@@ -17,7 +17,7 @@ use closecall_simulation::{Arm, RunKey};
 use super::CliError;
 use super::backend::check_backend_of;
 use super::help::heading;
-use super::output::print_written;
+use super::output::{during, print_written};
 use super::protect::Output;
 
 /// The level of detail of a recording.
@@ -96,6 +96,14 @@ impl WatchArgs {
         ]
     }
 
+    /// Prints which files were written: the recording and the tables. The names of OSI trace files are
+    /// those of the standard: they are printed when they are written.
+    pub(super) fn print_files(&self) {
+        let named = self.outputs().into_iter().filter(|(option, _)| *option != "--osi");
+        named.filter_map(|(_, path)| path).for_each(print_written);
+        self.scans.iter().flat_map(|path| companion_files(path)).for_each(|path| print_written(&path));
+    }
+
     /// Returns the tables to write.
     fn tables(&self) -> TableFiles<'_> {
         TableFiles {
@@ -119,14 +127,12 @@ pub(super) fn run_watched(
         let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
         write_recording_unchecked(path, &films.into_iter().map(named).collect::<Vec<_>>())?;
     }
-    // The names of trace files are those of the standard: they are printed when they are written.
-    let named = watch.outputs().into_iter().filter(|(option, _)| *option != "--osi");
-    named.filter_map(|(_, path)| path).for_each(print_written);
-    watch.scans.iter().flat_map(|path| companion_files(path)).for_each(|path| print_written(&path));
+    watch.print_files();
     Ok(outcomes)
 }
 
-/// Runs a sample in one arm, writes the requested tables, and returns a film of the run. The caller saves the recording.
+/// Runs a sample in one arm, writes the requested tables, and returns a film of the run. The caller saves the
+/// recording, and prints the files.
 pub(super) fn run_filmed(
     scenario: &Scenario,
     key: RunKey,
@@ -157,7 +163,8 @@ fn run(
             tables: is_tested.then_some(&mut tables),
             osi: osi.as_mut().filter(|_| is_tested),
         };
-        let outcome = run_guarded(scenario, key, arm, &mut observers)
+        let work = format!("running sample {} of {} with {}", key.sample, scenario.name, arm.controller.name());
+        let outcome = during(work, || run_guarded(scenario, key, arm, &mut observers))
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
         films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
         outcomes.push(outcome);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::support::{closecall, code, folder, json, message, stdout};
+use crate::support::{closecall, code, folder, json, message, stderr, stdout};
 use closecall_traffic::maths;
 
 /// Returns a table of pairs whose followers keep 1.5 s and 2 m behind a leader that drives in
@@ -30,8 +30,9 @@ fn a_calibration_gives_a_member_that_a_campaign_takes() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name).display().to_string();
     std::fs::write(at("pairs.csv"), table()).unwrap();
-    let result =
-        json(&closecall(["traffic", "calibrate", &at("pairs.csv"), "--format=json", "-o", &at("member.toml")]), 0);
+    let output = closecall(["traffic", "calibrate", &at("pairs.csv"), "--format=json", "-o", &at("member.toml")]);
+    let result = json(&output, 0);
+    assert!(stderr(&output).contains(&format!("written: {}\n", at("member.toml"))), "{}", stderr(&output));
     let pairs = result["pairs"].as_array().unwrap().len() + result["held_out"].as_array().unwrap().len();
     assert_eq!(pairs, 8);
     assert!(result["errors"]["pooled_calibration_pairs"]["rmse_m"].as_f64().unwrap() < 2.0, "{}", result["errors"]);

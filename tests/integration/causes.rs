@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{ROOT, closecall, code, folder, json, library, message, records, stdout};
+use crate::support::{ROOT, closecall, code, folder, json, library, message, records, stderr, stdout};
 
 /// The seed of all campaigns here.
 const SEED: &str = "4021";
@@ -104,7 +104,12 @@ fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
     for sample in failing.into_iter().take(5) {
         let file = parent.path().join(format!("case-{sample}.toml"));
         let (dir, name, number) = (path.to_str().unwrap(), file.to_str().unwrap(), sample.to_string());
-        let case = json(&closecall(["minimize", dir, &number, "--out", name, "--format", "json"]), 0);
+        let output = closecall(["minimize", dir, &number, "--out", name, "--format", "json"]);
+        let case = json(&output, 0);
+        for key in ["failing", "twin"] {
+            let written = format!("written: {}\n", case["files"][key].as_str().unwrap());
+            assert!(stderr(&output).contains(&written), "{}", stderr(&output));
+        }
         let off = case["minimized"]["off_nominal"].as_array().unwrap().len();
         assert!(off <= 3 || case["minimized"]["why_more_than_three"].is_string(), "{case:#}");
         // No parameter of this scenario is correlated: the distances add like the sides of a box.

@@ -74,6 +74,9 @@ fn the_library_is_listed_and_works_from_anywhere() {
     assert!(listing.starts_with("paper-figure\n  Does the margin increase system"), "{listing}");
     assert_eq!(stdout(&run_in(folder.path(), &["list", "PAPER"]), 0), listing);
     assert_eq!(stdout(&run_in(folder.path(), &["list", "Fault"]), 0), faults);
+    let of_requirement = stdout(&run_in(folder.path(), &["list", "mis-2"]), 0);
+    assert!(of_requirement.contains("requirements: ") && of_requirement.contains("MIS-2"), "{of_requirement}");
+    assert!(of_requirement.lines().filter(|line| line.contains("requirements: ")).all(|line| line.contains("MIS-2")));
     let headline = stdout(&run_in(folder.path(), &["list", "headline"]), 0);
     for name in ["low-thw-overtake", "low-thw-overtake-as-recorded"] {
         assert!(headline.lines().any(|line| line == name), "{headline}");
@@ -81,7 +84,7 @@ fn the_library_is_listed_and_works_from_anywhere() {
     assert!(!headline.contains("paper-figure"), "{headline}");
     assert!(
         message(&run_in(folder.path(), &["list", "no-such"]))
-            .contains("no scenario has `no-such` in its name or as a tag")
+            .contains("no scenario has `no-such` in its name, as a tag or as a requirement")
     );
     let run = json(&run_in(folder.path(), &["run", "paper-figure", "--format", "json"]), 0);
     assert_eq!(run["scenario"], "paper-figure");
@@ -161,6 +164,8 @@ fn results_are_on_standard_output_and_the_paths_of_files_on_standard_error() {
     assert_eq!(code(&run_in(folder.path(), &campaign)), 0);
     let recorded =
         ["traffic", "record", "overtake-without-brake", "-n", "12", "--sensors", "ground-truth", "-o", "traffic.csv"];
+    let sampled = "traffic sample traffic.csv --vary cc1 --from 1.5 --to 0.3 --steps 2 -o sampled";
+    let sampled: Vec<&str> = sampled.split(' ').collect();
     for (words, file) in [
         (&["new", "mine"][..], "mine.toml"),
         (&["init", "repository"], "repository/closecall.toml"),
@@ -170,6 +175,9 @@ fn results_are_on_standard_output_and_the_paths_of_files_on_standard_error() {
         (&["tool", "export", "paper-figure", "-o", "case"], "case"),
         (&recorded, "traffic.csv"),
         (&["traffic", "fit", "traffic.csv", "-o", "fitted.toml"], "fitted.toml"),
+        (&["traffic", "reenact", "traffic.csv", "-o", "encounter.toml"], "encounter.toml"),
+        (&["traffic", "reenact", "traffic.csv", "--tracks", "tracks.parquet"], "tracks.parquet"),
+        (&sampled[..], "step-2.toml"),
     ] {
         let output = run_in(folder.path(), words);
         let printed = stdout(&output, 0);
@@ -241,8 +249,29 @@ fn the_option_for_onnx_runtime_belongs_to_the_commands_that_may_run_the_network(
     for words in [&["list"][..], &["new"], &["init"], &["baseline", "save"], &["traffic", "fit"], &["tool", "schema"]] {
         assert!(!has_option(words), "{words:?}");
     }
-    let refused = closecall(["list", "--onnxruntime", "libonnxruntime.so"]);
-    assert!(code(&refused) == 2 && message(&refused).contains("--onnxruntime"), "{}", message(&refused));
+    let words = "compare, traffic record, traffic reenact, study frontier, tool export";
+    for words in words.split(", ").map(|words| words.split(' ').collect::<Vec<_>>()) {
+        assert!(has_option(&words), "{words:?}");
+    }
+    let words = "traffic calibrate, traffic paper, traffic sample, traffic robustness, study map, study perceive, \
+                 study exposure, study fidelity, tool import, tool render";
+    for words in words.split(", ").map(|words| words.split(' ').collect::<Vec<_>>()) {
+        assert!(!has_option(&words), "{words:?}");
+    }
+    for words in [&["list"][..], &["traffic", "calibrate", "pairs.csv"], &["traffic", "paper", "a.csv", "-o", "out"]] {
+        let refused = closecall(words.iter().chain(&["--onnxruntime", "libonnxruntime.so"]));
+        assert!(code(&refused) == 2 && message(&refused).contains("--onnxruntime"), "{}", message(&refused));
+    }
+    for (words, expected) in [
+        (&["check", "paper-figure"][..], "--onnxruntime needs --watch"),
+        (&["compare", "before", "after"], "--onnxruntime needs --search"),
+    ] {
+        let refused = closecall(words.iter().chain(&["--onnxruntime", "libonnxruntime.so"]));
+        assert!(code(&refused) == 2 && message(&refused).contains(expected), "{}", message(&refused));
+    }
+    // The variable is for all commands.
+    let checked = program().args(["check", "paper-figure"]).env("ORT_DYLIB_PATH", "libonnxruntime.so").output();
+    stdout(&checked.unwrap(), 0);
 }
 
 #[test]

@@ -109,6 +109,9 @@ fn every_report_says_why_samples_failed_and_which_to_replay() {
     }
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("closecall replay . 0 --scenario low-thw-overtake --controller exec"));
+    // Nothing was measured.
+    let text = stdout(&failing(folder.path(), controller, &["--no-out"]), 5);
+    assert!(!text.contains("slower than the lead vehicle"), "{text}");
     // A campaign that ends early says it, too.
     let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast"]), 5);
     assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");
@@ -157,20 +160,26 @@ fn control_characters_of_a_controller_reach_no_reader() {
     let folder = folder();
     short(folder.path());
     // Escape, backspace, NUL, and a character that turns the direction of text.
-    let text = "import sys\nsys.stderr.write('\\x1b[2Jred\\x08\\x00\\u202egreen\\x9b<img src=x>')\n";
+    let text = "import sys\nsys.stderr.write('\\x1b[2Jred\\x08\\x00\\u202egreen\\x9b<img src=x> **b** &lt;i> @user #12 \\ufeff\\U000e0041')\n";
     fs::write(folder.path().join("odd.py"), text).unwrap();
     let controller = "exec:env PYTHONIOENCODING=utf-8 python3 odd.py";
     let output = failing(folder.path(), controller, &["--out", "out"]);
     let console = [stdout(&output, 5), stderr(&output)].concat();
     assert!(console.contains("\\u001b[2Jred\\u0008\\u0000\\u202egreen\\u009b"), "{console}");
-    let is_hidden =
-        |c: char| (c.is_control() && !matches!(c, '\n' | '\t' | '\r')) || matches!(c, '\u{202a}'..='\u{202e}');
+    let is_hidden = |c: char| {
+        (c.is_control() && !matches!(c, '\n' | '\t' | '\r'))
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{feff}' | '\u{e0041}')
+    };
     assert!(!console.contains(is_hidden));
     for name in ["junit.xml", "samples.xml", "summary.md", "report.html"] {
         let text = fs::read_to_string(folder.path().join("out").join(name)).unwrap();
         assert!(text.contains("\\u001b[2Jred") && !text.contains(is_hidden), "{name}");
         assert!(!text.contains("<img src=x>"), "{name}");
     }
+    // Markdown marks, links and mentions nothing.
+    let summary = fs::read_to_string(folder.path().join("out/summary.md")).unwrap();
+    let expected = r"\*\*b\*\* &amp;lt;i> <span>@</span>user <span>#</span>12 \ufeff\udb40\udc41";
+    assert!(summary.contains(expected), "{summary}");
     // So do the names that a user gives.
     let output = closecall(["check", "\u{1b}[31mnone.toml"]);
     assert!(code(&output) != 0 && !stderr(&output).contains('\u{1b}') && stderr(&output).contains("\\u001b"));

@@ -99,13 +99,14 @@ fn a_fixed_step_divides_the_control_step() {
 }
 
 /// The faults of `faulty_fmu.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 7] = [
+const FAULTS: [(&str, &str); 8] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV))"),
     ("hang", "failed at 2.00 s: no answer within 500 ms"),
     ("nan", "asked for an acceleration of NaN m/s² at 2.00 s"),
     ("state", "the FMU answered the state 7: the state must be 0 (following)"),
     ("error", "fmi2DoStep answered fmi2Error: the solver does not converge"),
     ("fatal", "fmi2DoStep answered fmi2Fatal: the solver does not converge"),
+    ("formats", "the solver stops at %g s (Closecall does not fill in the values of this message)"),
     ("discard", "fmi2DoStep answered fmi2Discard"),
 ];
 

@@ -99,7 +99,7 @@ pub use environment::{Environment, EnvironmentConfig, Light};
 pub use lateral_path::LateralPath;
 pub use number::{Choice, Num, ParameterName};
 pub use optics::{KOSCHMIEDER, rain_db_per_km};
-pub use parameters::{Parameters, Value};
+pub use parameters::{Parameters, Value, readable};
 pub use quintic::{MINIMUM_JERK_PEAK, Quintic, minimum_jerk};
 pub use random::{Exp1, StandardNormal};
 pub use road::{Lane, NoLaneBeside, PlanePose, Road, RoadConfig, Side};

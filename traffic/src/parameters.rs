@@ -6,6 +6,7 @@ use std::fmt;
 use serde::de::{DeserializeOwned, IntoDeserializer, value};
 use serde::{Deserialize, Serialize};
 
+use crate::statistics::format::significant;
 use crate::{Choice, ConfigError, Num, ParameterName, Problem, Range};
 
 /// The value of a parameter.
@@ -16,6 +17,29 @@ pub enum Value {
     Number(f64),
     /// One label out of a choice.
     Label(String),
+}
+
+/// Significant digits of a value for readers (-).
+const READABLE_DIGITS: i32 = 4;
+
+impl Value {
+    /// Returns the value for readers: a number has four significant digits. All digits, with which
+    /// the same run is made again, are those of `Display`.
+    pub fn readable(&self) -> String {
+        match self {
+            Self::Number(value) => readable(*value),
+            Self::Label(label) => label.clone(),
+        }
+    }
+}
+
+/// Returns a number for readers, with four significant digits. A number is never shown as zero if it
+/// is none.
+pub fn readable(value: f64) -> String {
+    match significant(value, READABLE_DIGITS) {
+        zero if zero == "0" && value != 0.0 => value.to_string(),
+        text => text,
+    }
 }
 
 impl fmt::Display for Value {
@@ -128,5 +152,19 @@ fn expected_words(error: &value::Error) -> String {
 impl FromIterator<(ParameterName, Value)> for Parameters {
     fn from_iter<I: IntoIterator<Item = (ParameterName, Value)>>(values: I) -> Self {
         Self(values.into_iter().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_for_readers_has_four_digits_and_all_others_stay() {
+        let value = Value::Number(5.400_846_702_439_72);
+        assert_eq!((value.readable(), value.to_string()), ("5.401".to_owned(), "5.40084670243972".to_owned()));
+        let texts = [6.0, -0.216_437_4, 0.005_012_614, 12_345.67, 1e-12, 0.0].map(readable);
+        assert_eq!(texts, ["6", "-0.2164", "0.005013", "12346", "0.000000000001", "0"]);
+        assert_eq!(Value::Label("car".to_owned()).readable(), "car");
     }
 }

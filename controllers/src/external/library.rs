@@ -15,6 +15,7 @@ use crate::external::abi::{
 use crate::external::arithmetic::Arithmetic;
 use crate::external::error::LoadError;
 use crate::external::exchange::{Answer, Input, Setup};
+use crate::external::foreign::foreign_call;
 use crate::external::identity::{Identity, Run};
 use crate::external::platform;
 
@@ -25,6 +26,9 @@ const NEEDED: [&str; 4] = [
     "closecall_controller_step",
     "closecall_controller_destroy",
 ];
+
+/// The function that says why the last call failed.
+const ERROR: &str = "closecall_controller_error";
 
 /// The beginning of the names of the interface.
 const PREFIX: &str = "closecall_controller";
@@ -102,16 +106,17 @@ impl Library {
         // first.
         unsafe {
             let abi = function::<AbiFunction>(&module, NEEDED[0]).ok_or_else(|| missing(NEEDED[0]))?;
-            let actual = abi();
+            let actual = foreign_call(NEEDED[0], || abi());
             if actual != ABI {
                 return Err(LoadError::Abi { path: path.display().to_string(), actual, expected: ABI });
             }
-            let stated = |name| function::<TextFunction>(&module, name).and_then(|stated| text(stated()));
+            let stated =
+                |name| function::<TextFunction>(&module, name).and_then(|stated| text(foreign_call(name, || stated())));
             Ok(Self {
                 create: function(&module, NEEDED[1]).ok_or_else(|| missing(NEEDED[1]))?,
                 step: function(&module, NEEDED[2]).ok_or_else(|| missing(NEEDED[2]))?,
                 destroy: function(&module, NEEDED[3]).ok_or_else(|| missing(NEEDED[3]))?,
-                error: function(&module, "closecall_controller_error"),
+                error: function(&module, ERROR),
                 identity: Identity {
                     name: stated("closecall_controller_name"),
                     version: stated("closecall_controller_version"),
@@ -129,7 +134,7 @@ impl Library {
     pub(crate) fn start(self: &Arc<Self>, setup: &Setup) -> Result<LibraryRun, String> {
         let _kept = Arithmetic::keep();
         // SAFETY: the view is valid during the call.
-        let controller = setup.with_view(|view| unsafe { (self.create)(view) });
+        let controller = setup.with_view(|view| foreign_call(NEEDED[1], || unsafe { (self.create)(view) }));
         if controller.is_null() {
             return Err(format!("the library created no controller{}", self.reason(controller)));
         }
@@ -139,7 +144,7 @@ impl Library {
     /// Returns the library's text about its last failure, as the end of a message.
     fn reason(&self, controller: *mut c_void) -> String {
         // SAFETY: the controller is null, or lives.
-        let stated = self.error.and_then(|error| unsafe { text(error(controller)) });
+        let stated = self.error.and_then(|error| unsafe { text(foreign_call(ERROR, || error(controller))) });
         stated.map(|stated| format!(": {stated}")).unwrap_or_default()
     }
 }
@@ -160,7 +165,7 @@ impl Run for LibraryRun {
         let _kept = Arithmetic::keep();
         // SAFETY: the controller lives until it is dropped, and both views are valid during the
         // call.
-        let result = unsafe { (self.library.step)(self.controller, &view, &mut command) };
+        let result = foreign_call(NEEDED[2], || unsafe { (self.library.step)(self.controller, &view, &mut command) });
         if result != 0 {
             return Err(format!(
                 "the library answered with the error {result}{}",
@@ -176,6 +181,6 @@ impl Drop for LibraryRun {
     fn drop(&mut self) {
         let _kept = Arithmetic::keep();
         // SAFETY: the library has created the controller, and nothing uses it any more.
-        unsafe { (self.library.destroy)(self.controller) };
+        foreign_call(NEEDED[3], || unsafe { (self.library.destroy)(self.controller) });
     }
 }

@@ -7,3 +7,5 @@ cc.campaign("low-thw-overtake", max_collisions="three")
 cc.campaign("low-thw-overtake", design="latin")
 cc.run("low-thw-overtake", sensors="lidar")
 cc.campaign("low-thw-overtake").outcomes().rows
+cc.campaign("low-thw-overtake", preset="weekly")
+cc.lane_changes("traffic.csv", layout="gps")

@@ -11,6 +11,10 @@
 //! The failures are the failed gates and requirement checks, and nothing else. Samples stand in
 //! `samples.xml`.
 //!
+//! By the convention of JUnit, the time of a suite is the sum of the times of its cases, and not the
+//! time on the clock while they ran side by side. The time of a suite is that of its samples, summed
+//! over all threads. Its cases are judged on the same samples: each has an equal share of the time.
+//!
 //! Both files are valid by the schema of Jenkins' plugin xUnit (`junit-10.xsd`). The library
 //! `quick-junit` does not write them: version 0.8.0 adds `skipped` to `testsuites`, which the
 //! schema refuses, and holds all cases of a file in memory.
@@ -130,8 +134,9 @@ fn report(file: impl Write, findings: &Findings<'_>, wall_s: &[(String, f64)]) -
         let suite_s = wall_s.iter().find(|(name, _)| *name == suite).map_or(0.0, |(_, wall_s)| *wall_s);
         xml.write_event(Event::Start(totals("testsuite", &suite, &of_suite, suite_s)))?;
         properties(&mut xml, findings, &suite)?;
+        let share_s = suite_s / of_suite.len().max(1) as f64;
         for case in of_suite {
-            write_case(&mut xml, case)?;
+            write_case(&mut xml, case, share_s)?;
         }
         xml.write_event(Event::End(BytesEnd::new("testsuite")))?;
     }
@@ -212,10 +217,11 @@ fn arm_pair_properties(findings: &Findings<'_>, counts: &Counts) -> Vec<(String,
     pair_results(findings.summary, counts).into_iter().flat_map(properties).collect()
 }
 
-fn write_case<W: Write>(xml: &mut Writer<W>, case: &Case) -> io::Result<()> {
+fn write_case<W: Write>(xml: &mut Writer<W>, case: &Case, share_s: f64) -> io::Result<()> {
     let mut start = BytesStart::new("testcase");
     start.push_attribute(("name", legal_xml(&case.name).as_str()));
     start.push_attribute(("classname", legal_xml(&case.suite).as_str()));
+    start.push_attribute(("time", format!("{share_s:.3}").as_str()));
     xml.write_event(Event::Start(start))?;
     let element = match case.status {
         Status::Passed => None,

@@ -11,6 +11,7 @@ use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use super::recordings::card_beside;
 use super::text::{goals, imposed, not_prevented};
 use super::words::{reasons_below, sentence};
+use crate::escape::{in_markdown, markdown_code};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
@@ -34,9 +35,9 @@ pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteE
 /// Returns the summary.
 pub fn markdown(findings: &Findings<'_>) -> String {
     let sentence = sentence(findings.judged, findings.files.len());
-    let mut text = format!("## Closecall: {}\n\n", plain(&sentence));
+    let mut text = format!("## Closecall: {}\n\n", in_markdown(&sentence));
     for reason in &reasons_below(findings.judged, &sentence) {
-        text.push_str(&format!("- {}\n", plain(reason)));
+        text.push_str(&format!("- {}\n", in_markdown(reason)));
     }
     for (still, recording) in findings.worst_stills() {
         let (verdict, scenario, sample) = (still.verdict, cell(&still.scenario), still.sample);
@@ -47,7 +48,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         ));
     }
     if let Some(origins) = findings.folder.and_then(Origins::of) {
-        text.push_str(&format!("- {}\n", plain(&origins.choice_sentence())));
+        text.push_str(&format!("- {}\n", in_markdown(&origins.choice_sentence())));
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));
@@ -58,7 +59,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     text.push_str(&requirements(findings));
     for (scenario, results) in &findings.judged.coverage {
         text.push_str(&format!("Coverage of {}:\n\n", cell(scenario)));
-        results.iter().for_each(|result| text.push_str(&format!("- {}\n", plain(&line(result)))));
+        results.iter().for_each(|result| text.push_str(&format!("- {}\n", in_markdown(&line(result)))));
         text.push('\n');
     }
     for scenario in &findings.overview.scenarios {
@@ -70,7 +71,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         .manifest
         .settings()
         .iter()
-        .map(|setting| format!(", with <code>{}</code>", in_line(&setting.to_string())))
+        .map(|setting| format!(", with <code>{}</code>", in_markdown(&setting.to_string())))
         .collect();
     text.push_str(&format!(
         "<sub>Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design{settings}, \
@@ -232,35 +233,14 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
         let delta_v_mps = sample.delta_v_mps.unwrap_or_default();
         let with = sample.collision.as_ref().map(|(other, _)| other.to_string()).unwrap_or_default();
         let replay = findings.replay(&scenario.name, sample.sample);
-        text.push_str(&format!("| {} | {delta_v_mps:.1} m/s | {} | `{replay}` |\n", sample.sample, cell(&with)));
+        let replay = markdown_code(&replay).replace('|', "\\|");
+        text.push_str(&format!("| {} | {delta_v_mps:.1} m/s | {} | {replay} |\n", sample.sample, cell(&with)));
     }
     text.push_str("\n</details>\n\n");
     text
 }
 
-/// Returns text for HTML within a line.
-fn in_line(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace(['\n', '\r'], " ")
-}
-
-/// Returns text in one line, in which nothing starts HTML, an image or a link: a controller's
-/// message may hold all of them.
-fn plain(text: &str) -> String {
-    let mut plain = String::with_capacity(text.len());
-    let mut characters = text.chars().map(|c| if matches!(c, '\n' | '\r') { ' ' } else { c }).peekable();
-    while let Some(c) = characters.next() {
-        match (c, characters.peek()) {
-            ('<', Some(next)) if next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?') => {
-                plain.push_str("&lt;")
-            }
-            (']', Some('(')) => plain.push_str("\\]"),
-            _ => plain.push(c),
-        }
-    }
-    plain
-}
-
 /// Returns the text as it may stand in a cell of a table.
 fn cell(text: &str) -> String {
-    text.replace('|', "\\|").replace(['\n', '\r'], " ").replace('<', "&lt;")
+    in_markdown(text).replace('|', "\\|")
 }

@@ -219,7 +219,10 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
     if arm.unavailable > 0 {
         write!(f, "  not available in {}", arm.unavailable)?;
     }
-    write!(f, "  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps)?;
+    // Without an outcome, nothing was measured.
+    if arm.outcomes > 0 {
+        write!(f, "  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps)?;
+    }
     if arm.errors > 0 {
         write!(f, "  {}", counted(arm.errors, "ERROR").to_uppercase())?;
     }

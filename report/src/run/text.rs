@@ -69,7 +69,7 @@ impl fmt::Display for OutcomeText<'_> {
         )?;
         writeln!(f, "  {sentence}")?;
         for (name, value) in outcome.parameters.iter() {
-            writeln!(f, "  {name} = {value}")?;
+            writeln!(f, "  {name} = {}", value.readable())?;
         }
         for at in &outcome.moments {
             writeln!(f, "  {} at {:.2} s", letters.moment_label(at), at.time.s())?;

@@ -54,7 +54,10 @@ impl Kind {
 /// Why a line is no valid answer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum AnswerError {
-    /// The line is no JSON object.
+    /// The line is JSON, and no object.
+    #[error("the process answered {line:?}: it must be an object of JSON")]
+    NotObject { line: String },
+    /// The line is no JSON.
     #[error("the process answered {line:?}, which is not JSON: {reason}")]
     NotJson { line: String, reason: String },
     /// A field is not what it must be.
@@ -70,7 +73,7 @@ impl AnswerError {
             Self::Field { field, needed, found, .. } => {
                 format!("{who} answered: `{field}` must be {needed}, it is {}", found.trim_matches('"'))
             }
-            Self::NotJson { .. } => self.to_string(),
+            Self::NotObject { .. } | Self::NotJson { .. } => self.to_string(),
         }
     }
 }
@@ -356,7 +359,7 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, AnswerError> {
     let not_json = |reason: String| AnswerError::NotJson { line: excerpt(line), reason };
     match serde_json::from_slice(line) {
         Ok(Value::Object(object)) => Ok(object),
-        Ok(_) => Err(not_json("it must be an object".to_owned())),
+        Ok(_) => Err(AnswerError::NotObject { line: excerpt(line) }),
         // JSON has neither NaN nor infinity, but the JSON writers of many languages write them.
         Err(error) => Err(match not_finite(line) {
             Some((field, found)) => {
@@ -518,7 +521,8 @@ mod tests {
             (r#"{"time_ns":80000000}"#, "`tracks` must be a list of at most 256, it is absent"),
             (r#"{"time_ns":80000000,"detections":[]}"#, "`tracks` must be a list"),
             (r#"{"time_ns":80000000,"tracks":[1]}"#, "`tracks[0]` must be an object, it is 1"),
-            ("[]", "must be an object"),
+            ("[]", "answered \"[]\": it must be an object of JSON"),
+            ("null", "answered \"null\": it must be an object of JSON"),
             ("tracks", "not JSON"),
         ] {
             let error = parse(line).unwrap().unwrap_err().to_string();

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use closecall_campaign::action::CommandFor;
+use closecall_traffic::readable;
 use closecall_traffic::words::counted;
 
 use super::{Minimized, MinimizedFiles, NearestFailure};
@@ -58,7 +59,8 @@ fn write_smallest(f: &mut fmt::Formatter<'_>, minimized: &Minimized) -> fmt::Res
     )?;
     for offset in &minimized.off_nominal {
         let distance = offset.distance_sd.map(|sd| format!(", {:.2} standard deviations off", sd.abs()));
-        writeln!(f, "  {}{} (sample: {})", offset.words, distance.unwrap_or_default(), offset.sampled)?;
+        let sampled = offset.sampled.parse().map_or_else(|_| offset.sampled.clone(), readable);
+        writeln!(f, "  {}{} (sample: {sampled})", offset.words, distance.unwrap_or_default())?;
     }
     match minimized.distance_sd {
         Some(distance_sd) => writeln!(f, "  together {distance_sd:.2} standard deviations from the nominal case"),

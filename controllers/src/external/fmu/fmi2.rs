@@ -10,6 +10,7 @@ use libloading::Library as Module;
 
 use super::description::{Description, Type};
 use super::run::Instance;
+use crate::external::foreign::foreign_call;
 use crate::external::library::{function, text};
 
 type Component = *mut c_void;
@@ -19,7 +20,7 @@ type Status = c_int;
 #[repr(C)]
 struct Callbacks {
     /// The function of the standard has further arguments, to which the placeholders of the message
-    /// refer. They are ignored.
+    /// refer. A function of Rust cannot read them.
     logger: unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char),
     allocate: unsafe extern "C" fn(usize, usize) -> *mut c_void,
     free: unsafe extern "C" fn(*mut c_void),
@@ -40,8 +41,22 @@ unsafe extern "C" fn log(_: *mut c_void, _: *const c_char, status: Status, _: *c
     if let (Some(message), Ok(mut logged)) = (unsafe { text(message) }, LOGGED.lock())
         && status > WARNING
     {
-        *logged = message;
+        *logged = with_note(message);
     }
+}
+
+/// The note about a message whose values are missing.
+const NO_VALUES: &str = "(Closecall does not fill in the values of this message)";
+
+/// Returns a message with the note that its values are missing, if it has placeholders of `printf`.
+fn with_note(message: String) -> String {
+    let literal = message.replace("%%", "");
+    let flags_and_width = |c: char| c.is_ascii_digit() || "-+ #.*hlLqjzt".contains(c);
+    let is_placeholder =
+        |rest: &str| rest.trim_start_matches(flags_and_width).starts_with(|c: char| "diouxXeEfFgGaAcsp".contains(c));
+    let has_placeholder = literal.split('%').skip(1).any(is_placeholder);
+    let message = message.replace("%%", "%");
+    if has_placeholder { format!("{message} {NO_VALUES}") } else { message }
 }
 
 /// The largest status that is no failure: `fmi2Warning`.
@@ -150,7 +165,7 @@ impl Instance2 {
         let (name, token) = (text("closecall")?, text(&description.token)?);
         let folder = text(&format!("file://{}", resources.display()))?;
         // SAFETY: the texts live during the call, the callbacks as long as the instance.
-        let component = unsafe {
+        let component = foreign_call("fmi2Instantiate", || unsafe {
             (functions.instantiate)(
                 name.as_ptr(),
                 CO_SIMULATION,
@@ -160,7 +175,7 @@ impl Instance2 {
                 0,
                 0,
             )
-        };
+        });
         if component.is_null() {
             return Err(format!("the FMU created no instance{}", logged()));
         }
@@ -189,17 +204,19 @@ fn logged() -> String {
 impl Instance for Instance2 {
     fn enter(&mut self, start_s: f64) -> Result<(), String> {
         // SAFETY: the instance lives, here and below.
-        let status = unsafe { (self.functions.setup)(self.component, 0, 0.0, start_s, 0, 0.0) };
+        let status = foreign_call("fmi2SetupExperiment", || unsafe {
+            (self.functions.setup)(self.component, 0, 0.0, start_s, 0, 0.0)
+        });
         self.check(status, "fmi2SetupExperiment")?;
         // SAFETY: as above.
-        let status = unsafe { (self.functions.enter)(self.component) };
+        let status = foreign_call("fmi2EnterInitializationMode", || unsafe { (self.functions.enter)(self.component) });
         self.is_initialized = true;
         self.check(status, "fmi2EnterInitializationMode")
     }
 
     fn exit(&mut self) -> Result<(), String> {
         // SAFETY: as above.
-        let status = unsafe { (self.functions.exit)(self.component) };
+        let status = foreign_call("fmi2ExitInitializationMode", || unsafe { (self.functions.exit)(self.component) });
         self.check(status, "fmi2ExitInitializationMode")
     }
 
@@ -207,7 +224,7 @@ impl Instance for Instance2 {
         #[expect(clippy::cast_possible_truncation, reason = "whole numbers; a cast saturates")]
         let whole = value as c_int;
         // SAFETY: as above; the values live during the call.
-        let status = unsafe {
+        let status = foreign_call("a function fmi2Set…", || unsafe {
             match of_type {
                 Type::Float64 | Type::Float32 => {
                     (self.functions.set_real)(self.component, &raw const reference, 1, &raw const value)
@@ -218,7 +235,7 @@ impl Instance for Instance2 {
                 }
                 _ => (self.functions.set_integer)(self.component, &raw const reference, 1, &raw const whole),
             }
-        };
+        });
         self.check(status, "setting a variable")
     }
 
@@ -226,25 +243,26 @@ impl Instance for Instance2 {
         let (mut value, mut whole) = (f64::NAN, 0);
         let is_real = of_type.is_real();
         // SAFETY: as above.
-        let status = unsafe {
+        let status = foreign_call("a function fmi2Get…", || unsafe {
             match is_real {
                 true => (self.functions.get_real)(self.component, &raw const reference, 1, &raw mut value),
                 false => (self.functions.get_integer)(self.component, &raw const reference, 1, &raw mut whole),
             }
-        };
+        });
         self.check(status, "reading a variable")?;
         Ok(if is_real { value } else { f64::from(whole) })
     }
 
     fn do_step(&mut self, time_s: f64, step_s: f64) -> Result<(), String> {
         // SAFETY: as above.
-        let status = unsafe { (self.functions.do_step)(self.component, time_s, step_s, 1) };
+        let status =
+            foreign_call("fmi2DoStep", || unsafe { (self.functions.do_step)(self.component, time_s, step_s, 1) });
         self.check(status, "fmi2DoStep")
     }
 
     fn reset(&mut self) -> Result<(), String> {
         // SAFETY: as above.
-        let status = unsafe { (self.functions.reset)(self.component) };
+        let status = foreign_call("fmi2Reset", || unsafe { (self.functions.reset)(self.component) });
         self.is_initialized = false;
         self.check(status, "fmi2Reset")
     }
@@ -257,10 +275,31 @@ impl Drop for Instance2 {
             // SAFETY: as above. Nothing uses the instance any more.
             unsafe {
                 if self.is_initialized {
-                    (self.functions.terminate)(self.component);
+                    foreign_call("fmi2Terminate", || (self.functions.terminate)(self.component));
                 }
-                (self.functions.free_instance)(self.component);
+                foreign_call("fmi2FreeInstance", || (self.functions.free_instance)(self.component));
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_with_placeholders_says_that_its_values_are_missing() {
+        for message in ["solver did not converge at %g s", "no licence for %s", "%-8.3lf m left", "%d of 100 %%"] {
+            let shown = with_note(message.to_owned());
+            let expected = format!("{} {NO_VALUES}", message.replace("%%", "%"));
+            assert_eq!(shown, expected);
+        }
+        for (message, shown) in [
+            ("the solver does not converge", "the solver does not converge"),
+            ("100 %% done", "100 % done"),
+            ("50 %", "50 %"),
+        ] {
+            assert_eq!(with_note(message.to_owned()), shown);
         }
     }
 }

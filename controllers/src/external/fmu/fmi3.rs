@@ -10,6 +10,7 @@ use libloading::Library as Module;
 
 use super::description::{Description, Type};
 use super::run::Instance;
+use crate::external::foreign::foreign_call;
 use crate::external::library::{function, text};
 
 type Component = *mut c_void;
@@ -149,7 +150,7 @@ impl Instance3 {
         let folder = text(&format!("{}/", resources.display()))?;
         let (none, nothing) = (std::ptr::null(), std::ptr::null_mut());
         // SAFETY: the texts live during the call.
-        let component = unsafe {
+        let component = foreign_call("fmi3InstantiateCoSimulation", || unsafe {
             (functions.instantiate)(
                 name.as_ptr(),
                 token.as_ptr(),
@@ -164,7 +165,7 @@ impl Instance3 {
                 Some(log),
                 std::ptr::null(),
             )
-        };
+        });
         if component.is_null() {
             return Err(format!("the FMU created no instance{}", logged()));
         }
@@ -185,7 +186,9 @@ impl Instance3 {
     fn set_with<T>(&self, setter: Option<Setter<T>>, reference: u32, value: T) -> Result<Status, String> {
         let setter = setter.ok_or("the FMU lacks the function that sets one of its variables")?;
         // SAFETY: the instance lives, and the value lives during the call.
-        Ok(unsafe { setter(self.component, &raw const reference, 1, &raw const value, 1) })
+        Ok(foreign_call("a function fmi3Set…", || unsafe {
+            setter(self.component, &raw const reference, 1, &raw const value, 1)
+        }))
     }
 
     /// Reads one variable with a function that the FMU may lack.
@@ -193,7 +196,9 @@ impl Instance3 {
         let getter = getter.ok_or("the FMU lacks the function that reads one of its variables")?;
         let mut value = T::default();
         // SAFETY: as above.
-        let status = unsafe { getter(self.component, &raw const reference, 1, &raw mut value, 1) };
+        let status = foreign_call("a function fmi3Get…", || unsafe {
+            getter(self.component, &raw const reference, 1, &raw mut value, 1)
+        });
         Ok((status, value))
     }
 }
@@ -207,14 +212,16 @@ impl Instance3 {
 impl Instance for Instance3 {
     fn enter(&mut self, start_s: f64) -> Result<(), String> {
         // SAFETY: the instance lives, here and below.
-        let status = unsafe { (self.functions.enter)(self.component, false, 0.0, start_s, false, 0.0) };
+        let status = foreign_call("fmi3EnterInitializationMode", || unsafe {
+            (self.functions.enter)(self.component, false, 0.0, start_s, false, 0.0)
+        });
         self.is_initialized = true;
         self.check(status, "fmi3EnterInitializationMode")
     }
 
     fn exit(&mut self) -> Result<(), String> {
         // SAFETY: as above.
-        let status = unsafe { (self.functions.exit)(self.component) };
+        let status = foreign_call("fmi3ExitInitializationMode", || unsafe { (self.functions.exit)(self.component) });
         self.check(status, "fmi3ExitInitializationMode")
     }
 
@@ -260,7 +267,7 @@ impl Instance for Instance3 {
         // The FMU may write any byte, and a `bool` of Rust must be 0 or 1.
         let (mut event, mut ends, mut is_early, mut reached_s) = (0_u8, 0_u8, 0_u8, time_s);
         // SAFETY: as above; the values live during the call.
-        let status = unsafe {
+        let status = foreign_call("fmi3DoStep", || unsafe {
             (self.functions.do_step)(
                 self.component,
                 time_s,
@@ -271,7 +278,7 @@ impl Instance for Instance3 {
                 &raw mut is_early,
                 &raw mut reached_s,
             )
-        };
+        });
         self.check(status, "fmi3DoStep")?;
         if ends != 0 {
             return Err(format!("the FMU asked to end the simulation{}", logged()));
@@ -284,7 +291,7 @@ impl Instance for Instance3 {
 
     fn reset(&mut self) -> Result<(), String> {
         // SAFETY: as above.
-        let status = unsafe { (self.functions.reset)(self.component) };
+        let status = foreign_call("fmi3Reset", || unsafe { (self.functions.reset)(self.component) });
         self.is_initialized = false;
         self.check(status, "fmi3Reset")
     }
@@ -297,9 +304,9 @@ impl Drop for Instance3 {
             // SAFETY: as above. Nothing uses the instance any more.
             unsafe {
                 if self.is_initialized {
-                    (self.functions.terminate)(self.component);
+                    foreign_call("fmi3Terminate", || (self.functions.terminate)(self.component));
                 }
-                (self.functions.free_instance)(self.component);
+                foreign_call("fmi3FreeInstance", || (self.functions.free_instance)(self.component));
             }
         }
     }

@@ -22,6 +22,7 @@ use crate::campaign::html::page::STYLE;
 use crate::campaign::overview::{Fate, Overview};
 use crate::campaign::recordings::card_beside;
 use crate::charts::style::{css, fate_colour};
+use crate::escape::from_markdown;
 
 /// The page's own style and script. The script filters, counts and links; Plotly draws.
 const OWN_STYLE: &str = include_str!("explorer.css");
@@ -164,7 +165,7 @@ fn recordings(saved: &SavedCampaign, place: &PagePlace, scenario: &str) -> BTree
 /// Returns the verdict that the campaign's summary states.
 fn verdict(saved: &SavedCampaign) -> Option<String> {
     let text = read_text(&saved.folder().file("summary.md")).ok()?;
-    Some(text.lines().next()?.strip_prefix("## Closecall: ")?.replace('\\', ""))
+    Some(from_markdown(text.lines().next()?.strip_prefix("## Closecall: ")?))
 }
 
 /// Returns the class of a verdict, which colours it as in the report.

@@ -79,6 +79,12 @@ fn the_verdict_for_ci_servers_is_valid_by_the_schema_of_xunit() {
     });
     assert_eq!(against_schema(&xml), Vec::<String>::new(), "{xml}");
     assert!(xml.contains("<testsuite name=\"low-thw-overtake\"") && xml.contains("time=\"1.250\""), "{xml}");
+    // The cases of a suite have its time together.
+    let suite = xml.split("<testsuite ").find(|suite| suite.starts_with("name=\"low-thw-overtake\"")).unwrap();
+    let time_s = |part: &str| part.split("time=\"").nth(1)?.split('"').next()?.parse::<f64>().ok();
+    let cases: Vec<f64> = suite.split("<testcase ").skip(1).filter_map(time_s).collect();
+    assert_eq!(cases.len(), suite.matches("<testcase ").count());
+    assert!((cases.iter().sum::<f64>() - 1.25).abs() < 0.01 && cases.iter().all(|case_s| *case_s > 0.0), "{xml}");
 }
 
 #[test]

@@ -165,7 +165,7 @@ fn push_table(page: &mut String, film: &Film) {
         Err(absent) => row("MIS", absent),
     }
     for (name, value) in outcome.parameters.iter() {
-        row(&format!("parameter {name}"), value);
+        row(&format!("parameter {name}"), &value.readable());
     }
     page.push('\n');
 }

@@ -90,7 +90,13 @@ pub enum ExecError {
         /// The limit (bytes).
         limit: usize,
     },
-    /// The line is not a JSON object.
+    /// The line is JSON, and no object.
+    #[error("the process answered {line:?}: it must be an object of JSON, such as {{\"acceleration_mps2\": …}}")]
+    NotObject {
+        /// The beginning of the line.
+        line: String,
+    },
+    /// The line is not JSON.
     #[error("the process answered {line:?}, which is not JSON: {reason}")]
     NotJson {
         /// The beginning of the line.

@@ -222,7 +222,7 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, ExecError> {
     let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
     match serde_json::from_slice(line) {
         Ok(Value::Object(object)) => Ok(object),
-        Ok(_) => Err(ExecError::NotJson { line: excerpt(line), reason: "it must be an object".to_owned() }),
+        Ok(_) => Err(ExecError::NotObject { line: excerpt(line) }),
         // JSON has neither NaN nor infinity, but the JSON writers of many languages write them.
         Err(error) => Err(match not_finite(line) {
             Some(value) => ExecError::NotFinite { value },
@@ -290,7 +290,8 @@ mod tests {
         for (line, stated) in [
             ("", "not JSON"),
             ("hello", "not JSON"),
-            ("[1, 2]", "must be an object"),
+            ("[1, 2]", "answered \"[1, 2]\": it must be an object of JSON, such as {\"acceleration_mps2\": …}"),
+            ("null", "answered \"null\": it must be an object of JSON"),
             ("{}", "`acceleration_mps2` must be a number, it is absent"),
             (r#"{"acceleration_mps2": null, "state": "following"}"#, "it is null"),
             (r#"{"acceleration_mps2": "-1", "state": "following"}"#, "it is \"-1\""),

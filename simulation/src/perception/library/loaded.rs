@@ -5,7 +5,7 @@
 use std::ffi::c_void;
 use std::path::Path;
 
-use closecall_controllers::external::{Arithmetic, Identity, LoadError, SharedLibrary, text};
+use closecall_controllers::external::{Arithmetic, Identity, LoadError, SharedLibrary, foreign_call, text};
 
 use super::abi::{
     ABI, AbiFunction, AnswerView, AnswersFunction, CreateFunction, DestroyFunction, Detection, ErrorFunction,
@@ -23,6 +23,9 @@ const NEEDED: [&str; 5] = [
     "closecall_perception_step",
     "closecall_perception_destroy",
 ];
+
+/// The function that says why the last call failed.
+const ERROR: &str = "closecall_perception_error";
 
 /// The beginning of the names of the interface.
 const PREFIX: &str = "closecall_perception";
@@ -50,11 +53,13 @@ impl Library {
         let _kept = Arithmetic::keep();
         // SAFETY: the header declares the functions with these types. The version is asked for first.
         unsafe {
-            let actual = shared.function::<AbiFunction>(abi)?();
+            let stated_abi = shared.function::<AbiFunction>(abi)?;
+            let actual = foreign_call(abi, || stated_abi());
             if actual != ABI {
                 return Err(LoadError::Abi { path: shared.path().to_owned(), actual, expected: ABI });
             }
-            let kind = match shared.function::<AnswersFunction>(answers)?() {
+            let stated_kind = shared.function::<AnswersFunction>(answers)?;
+            let kind = match foreign_call(answers, || stated_kind()) {
                 0 => Kind::Detections,
                 1 => Kind::Tracks,
                 other => {
@@ -66,14 +71,15 @@ impl Library {
                     });
                 }
             };
-            let stated = |name| shared.optional::<TextFunction>(name).and_then(|stated| text(stated()));
+            let stated =
+                |name| shared.optional::<TextFunction>(name).and_then(|stated| text(foreign_call(name, || stated())));
             let identity =
                 Identity { name: stated("closecall_perception_name"), version: stated("closecall_perception_version") };
             Ok(Self {
                 create: shared.function(create)?,
                 step: shared.function(step)?,
                 destroy: shared.function(destroy)?,
-                error: shared.optional("closecall_perception_error"),
+                error: shared.optional(ERROR),
                 kind,
                 identity,
                 _shared: shared,
@@ -95,7 +101,7 @@ impl Library {
     pub(super) fn start(&self, setup: &Setup) -> Result<Run<'_>, String> {
         let _kept = Arithmetic::keep();
         // SAFETY: the view is valid during the call.
-        let perception = setup.with_view(|view| unsafe { (self.create)(view) });
+        let perception = setup.with_view(|view| foreign_call(NEEDED[2], || unsafe { (self.create)(view) }));
         if perception.is_null() {
             return Err(format!("the library created no perception{}", self.reason(perception)));
         }
@@ -105,7 +111,7 @@ impl Library {
     /// Returns the library's text about its last failure, as the end of a message.
     fn reason(&self, perception: *mut c_void) -> String {
         // SAFETY: the perception is null, or lives.
-        let stated = self.error.and_then(|error| unsafe { text(error(perception)) });
+        let stated = self.error.and_then(|error| unsafe { text(foreign_call(ERROR, || error(perception))) });
         stated.map(|stated| format!(": {stated}")).unwrap_or_default()
     }
 }
@@ -138,8 +144,9 @@ impl Run<'_> {
         };
         let kept = Arithmetic::keep();
         // SAFETY: the perception lives until it is dropped, and both views with their lists are valid during the call.
-        let result =
-            with_input(setup, question, |input| unsafe { (self.library.step)(self.perception, input, &mut answer) })?;
+        let result = with_input(setup, question, |input| {
+            foreign_call(NEEDED[3], || unsafe { (self.library.step)(self.perception, input, &mut answer) })
+        })?;
         drop(kept);
         if result != 0 {
             let reason = self.library.reason(self.perception);
@@ -162,7 +169,7 @@ impl Drop for Run<'_> {
     fn drop(&mut self) {
         let _kept = Arithmetic::keep();
         // SAFETY: the library has created the perception, and nothing uses it any more.
-        unsafe { (self.library.destroy)(self.perception) };
+        foreign_call(NEEDED[4], || unsafe { (self.library.destroy)(self.perception) });
     }
 }
 
