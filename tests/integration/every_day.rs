@@ -241,6 +241,38 @@ fn a_campaign_that_grows_has_the_bytes_of_one_that_ran_at_once() {
 }
 
 #[test]
+fn a_sobol_sequence_goes_on_and_a_grid_says_why_it_does_not() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let campaign = |out: &str, design: &str, samples: &str, more: &[&str]| {
+        let mut command = program();
+        command.args(["campaign", "low-thw-overtake", "-n", samples, "--design", design, "--sensors", "ground-truth"]);
+        command
+            .args(["--no-gate", "--record", "worst:1", "--out", at(out).to_str().unwrap()])
+            .args(more)
+            .output()
+            .unwrap()
+    };
+    stdout(&campaign("once", "sobol", "12", &[]), 0);
+    stdout(&campaign("grown", "sobol", "5", &[]), 0);
+    let untouched = campaign("grown", "sobol", "12", &[]);
+    assert!(
+        code(&untouched) == 2 && stderr(&untouched).contains("already holds this campaign"),
+        "{}",
+        stderr(&untouched)
+    );
+    stdout(&campaign("grown", "sobol", "12", &["--resume"]), 0);
+    for ((name, content), (_, other)) in bytes(&at("once")).iter().zip(bytes(&at("grown"))) {
+        assert!(*content == other, "{name}");
+    }
+    stdout(&campaign("grid", "grid", "4", &[]), 0);
+    let refused = campaign("grid", "grid", "8", &["--resume"]);
+    assert_eq!(code(&refused), 2);
+    let told = message(&refused);
+    assert!(told.contains("4 there, 8 here (a grid does not grow: its points depend on their number)"), "{told}");
+}
+
+#[test]
 fn a_resumption_that_fails_fast_ends_at_the_next_failing_sample_and_blames_no_journal() {
     let folder = folder();
     let out = folder.path().join("out");
