@@ -100,7 +100,7 @@ fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
 }
 
 fn gate(gate: &GateResult) -> Value {
-    let Evaluation { value, interval_95, samples, hits, answer, needed } = gate.evaluation;
+    let Evaluation { value, interval_95, samples, hits, answer, needed, .. } = gate.evaluation;
     let passed = match answer {
         Answer::Met => Some(true),
         Answer::Missed => Some(false),
