@@ -9,7 +9,7 @@ use closecall_testing::has_python;
 use serde_json::Value;
 
 use crate::native_controllers::{compile, lib, with_fault};
-use crate::support::{closecall, code, folder, headline_with, json, message, program, stderr, stdout};
+use crate::support::{closecall, code, folder, headline_with, json, message, program, records, stderr, stdout};
 
 /// A step of a controller in Python that answers with `answer`.
 fn python(answer: &str) -> String {
@@ -270,6 +270,32 @@ fn a_sobol_sequence_goes_on_and_a_grid_says_why_it_does_not() {
     assert_eq!(code(&refused), 2);
     let told = message(&refused);
     assert!(told.contains("4 there, 8 here (a grid does not grow: its points depend on their number)"), "{told}");
+}
+
+#[test]
+fn wherever_letters_name_vehicles_a_line_says_which() {
+    const KEY: &str = "E is the ego, F the lead vehicle, R the rear vehicle";
+    let folder = folder();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let plan = ["-n", "20", "--seed", "1", "--sensors", "object", "--controller", "acc", "--no-gate"];
+    stdout(&closecall(["campaign", "low-thw-overtake", "--out", out].iter().chain(&plan)), 0);
+    let sample = records(Path::new(out))
+        .into_iter()
+        .find(|record| record.arms[0].result.as_ref().is_ok_and(|outcome| outcome.ego_collided()));
+    let sample = sample.expect("the baseline collides in a fifth of the samples").sample.to_string();
+    let times = |text: &str| text.matches(KEY).count();
+    for file in ["report.html", "summary.md", "recordings/index.html"] {
+        assert_eq!(times(&fs::read_to_string(Path::new(out).join(file)).unwrap()), 1, "{file}");
+    }
+    for args in [["replay", out, sample.as_str()], ["explain", out, sample.as_str()]] {
+        let text = stdout(&closecall(&args), 0);
+        assert!(text.contains("R struck E") || text.contains("E struck F"), "{text}");
+        assert_eq!(times(&text), 1, "{text}");
+    }
+    let run = ["run", "low-thw-overtake", "--sensors", "object"];
+    assert_eq!(times(&stdout(&closecall(run.iter().chain(&["--paired"])), 0)), 1);
+    assert_eq!(times(&stdout(&closecall(run.iter().chain(&["--format", "json"])), 0)), 0);
 }
 
 #[test]
