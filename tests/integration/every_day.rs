@@ -320,6 +320,28 @@ fn a_resumption_that_fails_fast_ends_at_the_next_failing_sample_and_blames_no_jo
 }
 
 #[test]
+#[cfg(unix)]
+fn the_sizes_in_the_examples_of_the_help_decide() {
+    let mut examples = 0;
+    for help in [&["--help"][..], &["campaign", "--help"]] {
+        let text = stdout(&closecall(help), 0);
+        for line in text.lines().filter_map(|line| line.trim().strip_prefix("closecall campaign low-thw-overtake ")) {
+            let words = Command::new("sh").args(["-c", &format!("printf '%s\\n' {line}")]).output().unwrap();
+            let words = String::from_utf8(words.stdout).unwrap();
+            for seed in ["0", "1"] {
+                let more = ["--sensors", "object", "--no-validity-checks", "--seed", seed, "--no-out"];
+                let mut command = program();
+                command.args(["campaign", "low-thw-overtake"]).args(words.lines()).args(more);
+                let output = command.output().unwrap();
+                assert!([0, 1].contains(&code(&output)), "{line} --seed {seed}: {output:?}");
+            }
+            examples += 1;
+        }
+    }
+    assert_eq!(examples, 3, "one of the program, two of the command");
+}
+
+#[test]
 fn an_inconclusive_gate_says_how_many_samples_would_decide() {
     let gate = |samples: &str| {
         let args = ["campaign", "overtake-without-brake", "-n", samples, "--sensors", "ground-truth", "--gate"];
