@@ -157,8 +157,9 @@ impl Folder {
         folder.remove_temporary_files()?;
         if folder.has(MANIFEST)? {
             let there = folder.manifest()?;
-            let grows = resume && there.grows_to(manifest);
-            let differences = if grows { Vec::new() } else { there.differences(manifest) };
+            let has_its_beginning = there.grows_to(manifest);
+            let grows = resume && has_its_beginning;
+            let differences = if has_its_beginning { Vec::new() } else { there.differences_in_growth(manifest) };
             if !differences.is_empty() {
                 return Err(FolderError::OtherCampaign { path: path.to_owned(), differences });
             }

@@ -215,17 +215,39 @@ impl Manifest {
         differences
     }
 
+    /// Works like [`Self::differences`]. If the campaigns differ in their number of samples, the
+    /// message says why this one does not grow to it.
+    pub fn differences_in_growth(&self, other: &Self) -> Vec<String> {
+        let mut differences = self.differences(other);
+        if let Some(why) = self.keeps_its_number(other) {
+            let of_number = |difference: &&mut String| difference.starts_with("sampling.samples: ");
+            differences.iter_mut().filter(of_number).for_each(|difference| difference.push_str(&format!(" ({why})")));
+        }
+        differences
+    }
+
     /// Returns true if `other` is the same campaign with more samples: it begins with the same
     /// samples.
     pub fn grows_to(&self, other: &Self) -> bool {
         let (sampling, more) = (self.sampling, other.sampling);
-        let is_fixed = self.inference == Inference::FixedSamples;
         let grown = Self { sampling: Sampling { samples: more.samples, ..sampling }, ..self.clone() };
-        // The points of a grid depend on their number.
-        is_fixed
-            && sampling.design != Design::Grid
-            && sampling.samples < more.samples
-            && grown.differences(other).is_empty()
+        sampling.samples < more.samples && self.keeps_its_number(other).is_none() && grown.differences(other).is_empty()
+    }
+
+    /// Returns why the campaign does not grow to the number of samples of `other`; `None` if it
+    /// does, or if both numbers are the same. A Sobol sequence and the bins of a coverage cross go
+    /// on after any number of samples.
+    fn keeps_its_number(&self, other: &Self) -> Option<&'static str> {
+        let (has, wanted) = (self.sampling.samples, other.sampling.samples);
+        match (self.inference, self.sampling.design) {
+            _ if has == wanted => None,
+            (Inference::Sequential, _) => {
+                Some("a campaign that its outcomes or the clock end keeps its largest number of samples")
+            }
+            (_, Design::Grid) => Some("a grid does not grow: its points depend on their number"),
+            _ if wanted < has => Some("a campaign gets more samples, and not fewer"),
+            _ => None,
+        }
     }
 
     /// Returns the settings: `--set` applies to every scenario.
@@ -471,11 +493,39 @@ mod tests {
     #[test]
     fn a_campaign_grows_unless_its_samples_depend_on_their_number() {
         let with = |samples, design| Manifest { sampling: Sampling { seed: 1, design, samples }, ..manifest() };
-        assert!(with(10, Design::Sobol).grows_to(&with(11, Design::Sobol)));
+        let of_design = |samples, design| Manifest { inference: Inference::Design, ..with(samples, design) };
+        assert!(with(10, Design::Random).grows_to(&with(11, Design::Random)));
+        assert!(of_design(10, Design::Sobol).grows_to(&of_design(11, Design::Sobol)));
+        assert!(of_design(10, Design::Coverage).grows_to(&of_design(11, Design::Coverage)));
+        assert!(!with(10, Design::Random).grows_to(&of_design(11, Design::Sobol)));
         assert!(!with(10, Design::Random).grows_to(&with(9, Design::Random)));
         assert!(!with(10, Design::Random).grows_to(&with(10, Design::Random)));
-        assert!(!with(10, Design::Grid).grows_to(&with(20, Design::Grid)));
+        assert!(!of_design(10, Design::Grid).grows_to(&of_design(20, Design::Grid)));
         assert!(!with(10, Design::Random).grows_to(&Manifest { retry_crashed: 1, ..with(20, Design::Random) }));
+        let sequential = |samples| Manifest { inference: Inference::Sequential, ..with(samples, Design::Random) };
+        assert!(!sequential(10).grows_to(&sequential(20)));
+    }
+
+    #[test]
+    fn a_campaign_that_does_not_grow_says_why() {
+        let with = |samples, design| Manifest { sampling: Sampling { seed: 1, design, samples }, ..manifest() };
+        let sequential = |samples| Manifest { inference: Inference::Sequential, ..with(samples, Design::Random) };
+        let said = |there: &Manifest, here: &Manifest| there.differences_in_growth(here).join("; ");
+        let grid = said(&with(32, Design::Grid), &with(64, Design::Grid));
+        assert_eq!(
+            grid,
+            "sampling.samples: 32 there, 64 here (a grid does not grow: its points depend on their number)"
+        );
+        assert!(
+            said(&with(10, Design::Sobol), &with(9, Design::Sobol))
+                .ends_with("9 here (a campaign gets more samples, and not fewer)")
+        );
+        assert!(
+            said(&sequential(10), &sequential(20)).contains("20 here (a campaign that its outcomes or the clock end")
+        );
+        assert_eq!(said(&with(10, Design::Random), &with(20, Design::Random)), "sampling.samples: 10 there, 20 here");
+        let other_seed = Manifest { sampling: Sampling { seed: 2, ..with(10, Design::Grid).sampling }, ..manifest() };
+        assert_eq!(said(&with(10, Design::Grid), &other_seed), "sampling.seed: 1 there, 2 here");
     }
 
     #[test]

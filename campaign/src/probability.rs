@@ -16,13 +16,12 @@
 
 use serde::Serialize;
 
-use super::gate::{GateSource, OpenReason, Standing};
+use super::gate::{GateSource, OpenReason, Standing, undecided};
 use super::ledger::{ArmCounts, Inference};
 use closecall_traffic::statistics::binomial::at_most;
 pub use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::needed;
 use closecall_traffic::statistics::sequence::{evidence_above, evidence_below, is_certain};
-use closecall_traffic::words::counted;
 
 /// The largest collision probability that is allowed, and the confidence in the answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,7 +203,10 @@ impl Finding {
             0 => String::new(),
             samples => format!(" ({})", percent(hits as f64 / samples as f64)),
         };
-        let missing = self.missing.map_or_else(|| OpenReason::DependentSamples.text().to_owned(), Missing::sentence);
+        let missing = self.missing.map_or_else(
+            || OpenReason::DependentSamples.text().to_owned(),
+            |missing| undecided(OpenReason::TooFewSamples, missing.total(samples)),
+        );
         let open = if self.answer == Answer::Open { format!(" ({missing})") } else { String::new() };
         format!(
             "{}: {scenario}: share of the samples in which the ego collides: {hits} of {samples}{share}, {}{open}; required: at \
@@ -218,17 +220,9 @@ impl Finding {
 }
 
 impl Missing {
-    fn sentence(self) -> String {
-        let Some(least) = self.without_collisions else {
-            return format!("more than {} samples are needed", needed::MAX_SAMPLES);
-        };
-        let verb = if least == 1 { "is" } else { "are" };
-        let least_text = format!("{} {verb} needed if none of them collides", counted(least, "more sample"));
-        match self.at_observed_rate {
-            Some(more) if more == least => least_text,
-            Some(more) => format!("{least_text}, {more} at the observed rate"),
-            None => format!("{least_text}, at the observed rate no number is enough"),
-        }
+    /// Returns the number of samples that decides if collisions go on at the observed rate.
+    fn total(self, samples: u64) -> Option<u64> {
+        self.at_observed_rate.map(|more| samples.saturating_add(more))
     }
 }
 
@@ -300,23 +294,21 @@ mod tests {
             (
                 0,
                 "0 of 200 (0 %), one-sided 95 % bounds 0 % and 1.49 %",
-                "99 more samples are needed if none of them collides",
+                "too few samples to decide, some 300 would if they are like these",
             ),
             (
                 1,
                 "1 of 200 (0.5 %), one-sided 95 % bounds 0.0256 % and 2.35 %",
-                "273 more samples are needed if none of them collides, 982 at the observed rate",
+                "too few samples to decide, some 1200 would if they are like these",
             ),
             (
                 3,
                 "3 of 200 (1.5 %), one-sided 95 % bounds 0.41 % and 3.83 %",
-                "573 more samples are needed if none of them collides, at the observed rate no number is enough",
+                "too few samples to decide, and no number would if they are like these",
             ),
         ] {
             assert_eq!(line(collisions, 200), said("open", &format!("{measured} ({missing})")));
         }
-        let one_more = Missing { without_collisions: Some(1), at_observed_rate: Some(1) };
-        assert_eq!(one_more.sentence(), "1 more sample is needed if none of them collides");
     }
 
     #[test]

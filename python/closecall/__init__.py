@@ -3,7 +3,7 @@
 >>> import closecall as cc
 >>> scenario = cc.Scenario.load("low-thw-overtake")
 >>> outcome = cc.run(scenario, controller="mis", sample=3)
->>> result = cc.campaign(scenario, n=200, controller="mis", paired=True)
+>>> result = cc.campaign(scenario, n=1000, controller="mis", paired=True)
 
 Units are part of the names: ``gap_m`` (m), ``speed_mps`` (m/s), ``acceleration_mps2`` (m/s²), ``thw_s`` (s).
 Positions of tracks are in the ego's frame: x ahead, y to the left, origin at the centre of the ego.

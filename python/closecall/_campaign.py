@@ -36,7 +36,9 @@ class CampaignResult:
     exit_code: int
     #: The verdict, such as ``PASS`` or ``FAIL``; ``ENDED EARLY`` if ``fail_fast`` or ``max_errors`` has ended the campaign, and
     #: ``measured, not judged`` with ``no_gate``.
-    verdict: str
+    verdict: str = field(repr=False)
+    #: The verdict in a sentence, as the command line prints it: it says how many gates are not checked.
+    sentence: str
     #: Number of samples.
     samples: int
     #: Number of samples that ended in an error.
@@ -61,7 +63,7 @@ class CampaignResult:
         return folder / name
 
     def _repr_html_(self) -> str:
-        """Shows the verdict with its reasons, the counts of each controller, and the outcome map."""
+        """Shows the verdict in a sentence with its reasons, the counts of each controller, and the outcome map."""
         heads = ("controller", "collisions", "rate", "95 % interval", "harm", "errors")
         rows = [_row(name, counts, self.samples) for name, counts in self.report.get("controllers", {}).items()]
         table = "".join(f"<tr>{''.join(f'<td>{_escaped(cell)}</td>' for cell in row)}</tr>" for row in rows)
@@ -69,7 +71,7 @@ class CampaignResult:
         head = "".join(f"<th>{name}</th>" for name in heads)
         samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"
         return (
-            f"<p><strong>{_escaped(self.verdict)}</strong>: {samples}</p><ul>{reasons}</ul>"
+            f"<p><strong>{_escaped(self.sentence)}</strong> ({samples})</p><ul>{reasons}</ul>"
             f"<table><thead><tr>{head}</tr></thead><tbody>{table}</tbody></table>{self._outcome_map()}"
         )
 
@@ -243,7 +245,7 @@ def campaign(
     if kept is not None:
         _keep_results(folder)
     verdict = keys.get("verdict", "ENDED EARLY") or "measured, not judged"
-    result = (code, verdict, keys["samples"], keys["errors"], keys["failures"], keys)
+    result = (code, verdict, keys.get("sentence", verdict), keys["samples"], keys["errors"], keys["failures"], keys)
     return CampaignResult(*result, None if kept is not None else folder, kept)
 
 

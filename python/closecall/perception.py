@@ -5,7 +5,7 @@
 >>> class Mine:
 ...     def track(self, input: PerceptionInput) -> list[PerceivedTrack]:
 ...         return []
->>> result = cc.campaign("low-thw-overtake", n=10, sensors="full", perception=Mine)
+>>> result = cc.campaign("low-thw-overtake", n=10, sensors="full", perception=Mine, no_gate=True)
 
 The arrays of a scan are memory views, which ``numpy.asarray`` reads without copying. Positions are in the ego's frame: x ahead, y
 to the left, z up, origin in the middle of the ego on the ground. ``docs/reference/perception.md`` explains every value.

@@ -47,6 +47,16 @@ def test_the_text_of_a_result_is_short() -> None:
     assert len(repr(result)) < 400 and "0x" not in repr(result)
 
 
+def test_a_result_says_beside_its_verdict_what_is_not_checked() -> None:
+    unpaired = cc.campaign(SCENARIO, n=200, seed=5, sensors="object", max_collisions=100)
+    sentence = "PASS: 5 of 8 gates are met, 3 not checked"
+    assert (unpaired.verdict, unpaired.sentence) == ("PASS", sentence)
+    assert f"<strong>{sentence}</strong>" in unpaired._repr_html_()
+    assert f"sentence='{sentence}'" in repr(unpaired) and "'PASS'" not in repr(unpaired)
+    measured = small(no_gate=True)
+    assert measured.sentence == measured.verdict == "measured, not judged"
+
+
 def test_a_campaign_without_a_folder_cannot_be_resumed() -> None:
     with pytest.raises(cc.UsageError, match="name the folder of the campaign with `out`"):
         small(resume=True)

@@ -45,7 +45,7 @@ def test_the_cells_of_the_tutorial_run_twice_in_one_kernel_and_end_in_a_gate(tmp
     for cell_1, cell_2 in zip(twice.cells[:CELLS], twice.cells[CELLS:], strict=True):
         assert shown(cell_1) and ("rerun" in shown(cell_1) or shown(cell_1) == shown(cell_2)), cell_1.source
     verdicts = [shown(cell).split(":")[0] for cell in twice.cells if "= cc.campaign(" in cell.source]
-    assert verdicts == 2 * ["<p><strong>FAIL</strong>", "<p><strong>PASS</strong>"]
+    assert verdicts == 2 * ["<p><strong>FAIL", "<p><strong>PASS"]
     last = twice.cells[-1]
     assert "upper(induced)" in shown(last) and "python:Mended" in shown(last)
 

@@ -17,6 +17,9 @@ use closecall_traffic::{ActorId, Time};
 use super::Scenario;
 use crate::outcome::{Collision, MisSummary, Moment, Outcome, ReachedMoment};
 
+/// The key of [`VehicleLetters`], for every output that uses them.
+pub const LETTERS: &str = "E is the ego, F the lead vehicle, R the rear vehicle";
+
 /// The letters of the vehicles of an encounter: E is the ego, F the lead vehicle, R the rear
 /// vehicle. Any other vehicle has its name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -406,11 +406,26 @@ impl ScenarioFile {
         checked.map(|scenario| self.with_program_folder(scenario)).map_err(|source| {
             let near = match parameters_near(&self.text, &source.path) {
                 Some(near) => near,
-                None if named.is_empty() => parameters.iter().map(|(name, _)| name.as_str().to_owned()).collect(),
+                None if named.is_empty() => self.parameters_of(&source, parameters),
                 None => Vec::new(),
             };
             self.located(source, describe(&[near.as_slice(), named].concat(), parameters))
         })
+    }
+
+    /// Returns the names of the parameters that an error depends on: a slightly different number
+    /// leads to another error, or to none. Returns all names if no number does.
+    fn parameters_of(&self, error: &ConfigError, parameters: &Parameters) -> Vec<String> {
+        const STEP: f64 = 1e-3;
+        let matters = |(name, value): &(&ParameterName, &Value)| {
+            let Value::Number(number) = value else { return false };
+            let mut changed = parameters.clone();
+            changed.insert((*name).clone(), Value::Number(number + STEP * number.abs().max(1.0)));
+            self.config.check(&changed).err().as_ref() != Some(error)
+        };
+        let names = |(name, _): (&ParameterName, &Value)| name.as_str().to_owned();
+        let concerned: Vec<String> = parameters.iter().filter(matters).map(names).collect();
+        if concerned.is_empty() { parameters.iter().map(names).collect() } else { concerned }
     }
 
     /// Returns an error with its place in the file. `at` says when it holds.
@@ -455,6 +470,7 @@ fn parameters_near(text: &str, path: &KeyPath) -> Option<Vec<String>> {
     for segment in &path.0 {
         let value = around.last()?;
         around.push(match segment {
+            Segment::Key(_) if value.is_array() => break,
             Segment::Key(key) => value.get(key.as_str())?,
             Segment::Index(index) => value.get(*index)?,
         });
@@ -612,6 +628,29 @@ mod tests {
         let file = ScenarioFile::parse(Path::new("a.toml"), text, &[setting]).unwrap();
         let message = file.check().unwrap_err().to_string();
         assert!(message.contains("(with closing-mps = 8.35)") && !message.contains("cut-out-thw-s"), "{message}");
+    }
+
+    #[test]
+    fn an_error_in_a_list_or_of_a_value_that_follows_names_only_what_it_depends_on() {
+        let text = super::super::library::text("low-thw-overtake").unwrap();
+        let message = |setting: &str| {
+            let file = ScenarioFile::parse(Path::new("a.toml"), text, &[setting.parse().unwrap()]).unwrap();
+            file.check().unwrap_err().to_string()
+        };
+        for speed in ["400", "-1"] {
+            let told = message(&format!("cruise-mps={speed}"));
+            assert!(told.ends_with(&format!("(with cruise-mps = {speed})")), "{told}");
+        }
+        let file = ScenarioFile::parse(Path::new("a.toml"), text, &[]).unwrap();
+        let nominal = file.space().nominal();
+        let names_with = |name: &str, value: Value| {
+            let mut wrong = nominal.clone();
+            wrong.insert(ParameterName::new(name).unwrap(), value);
+            file.parameters_of(&file.config.check(&wrong).err().unwrap(), &wrong)
+        };
+        assert_eq!(names_with("cruise-mps", Value::Number(400.0)), ["cruise-mps"]);
+        let of_label = names_with("rear-class", Value::Label("tram".to_owned()));
+        assert_eq!(of_label.len(), nominal.iter().count(), "no number is to blame");
     }
 
     #[test]

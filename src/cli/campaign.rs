@@ -63,9 +63,9 @@ use crate::exit_code::ExitCode;
 /// Arguments of a campaign.
 #[derive(Debug, Args, Deserialize)]
 #[command(after_help = examples([
-    "closecall campaign low-thw-overtake",
+    "closecall campaign low-thw-overtake -n 1000 --paired",
     "closecall campaign scenarios --preset pr --out results",
-    "closecall campaign low-thw-overtake -n 500 --paired --gate 'upper(induced) <= 0.01'",
+    "closecall campaign low-thw-overtake -n 1000 --paired --gate 'upper(induced) <= 0.02'",
 ]))]
 pub(super) struct CampaignArgs {
     /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard

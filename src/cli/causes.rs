@@ -9,6 +9,7 @@ use closecall_campaign::saved::SavedCampaign;
 use closecall_recorded::filters::smooth;
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
+use closecall_scenarios::causal::LETTERS;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::CausesError;
 use closecall_studies::case::Case;
@@ -84,6 +85,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
             for explanation in &explanations {
                 print_text(format_args!("{}\n", ExplanationText { explanation, folder: &args.dir, command_for }));
             }
+            outln!("{LETTERS}");
         }
     }
     Ok(ExitCode::Pass)

@@ -124,7 +124,7 @@ Terms such as ego, headway, prevented, induced: docs/reference/glossary.md
 
 Examples:
   closecall run low-thw-overtake
-  closecall campaign low-thw-overtake -n 500 --paired
+  closecall campaign low-thw-overtake -n 1000 --paired
   closecall traffic lane-changes traffic.csv";
 
 #[derive(Debug, Subcommand)]

@@ -102,7 +102,7 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
     }
     print_written(&path);
     let shown = path.display();
-    print_error(format_args!("next: closecall check {shown} --watch, closecall campaign {shown} -n 200 --paired\n"));
+    print_error(format_args!("next: closecall check {shown} --watch, closecall campaign {shown} -n 1000 --paired\n"));
     Ok(ExitCode::Pass)
 }
 
@@ -129,7 +129,7 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
     }
     let scenarios = args.dir.join(SCENARIOS);
     print_error(format_args!(
-        "next: closecall check {0}, closecall campaign {0} -n 200 --paired\n",
+        "next: closecall check {0}, closecall campaign {0} -n 1000 --paired\n",
         scenarios.display()
     ));
     Ok(ExitCode::Pass)

@@ -6,7 +6,7 @@ use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::json;
 use closecall_report::run::text::OutcomeText;
-use closecall_scenarios::causal::{VehicleLetters, causal_sentence};
+use closecall_scenarios::causal::{LETTERS, VehicleLetters, causal_sentence};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, Setting};
@@ -84,6 +84,7 @@ pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome],
                 let sentence = causal_sentence(scenario, arm.sensors, outcome);
                 print_text(OutcomeText { outcome, sentence: &sentence, letters: &letters });
             }
+            outln!("{LETTERS}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use closecall_scenarios::criteria::Expression;
 
@@ -108,29 +108,74 @@ fn the_program_accepts_the_gates_that_the_ci_files_show() {
     assert!("max(contacts) < 1".parse::<Expression>().is_err());
 }
 
-#[test]
+/// Runs the step of the action that starts the campaign, with a program that prints its words and
+/// ends with 1.
 #[cfg(unix)]
-fn the_action_carries_a_quoted_gate() {
+fn step_of_campaign(home: &Path, scenarios: &str, options: &str) -> Output {
     let yaml = text(".github/actions/campaign/action.yml");
     let run = yaml.split_once("      run: |\n        code=0\n").unwrap().1;
     let script: Vec<&str> = run.lines().map_while(|line| line.strip_prefix("        ")).collect();
-    let home = folder();
-    let program = home.path().join(".closecall/bin/closecall");
+    let program = home.join(".closecall/bin/closecall");
     fs::create_dir_all(program.parent().unwrap()).unwrap();
     write_executable(&program, "#!/bin/sh\nprintf '<%s>' \"$@\"\nexit 1\n");
-    let job = Command::new("bash")
-        .args(["-e", "-c", &format!("code=0\n{}", script.join("\n"))])
-        .env("HOME", home.path())
-        .envs([("SCENARIOS", "a b"), ("PRESET", "pr"), ("SEED", "1"), ("CONTROLLER", "exec:python3 my.py")])
-        .envs([("OPTIONS", "--gate 'upper(induced) <= 0.03' --max-induced 0 '$(touch x)'"), ("OUT", "out")])
-        .env("GITHUB_OUTPUT", home.path().join("output"))
+    // As GitHub runs a step with `shell: bash`.
+    Command::new("bash")
+        .args(["--noprofile", "--norc", "-e", "-o", "pipefail", "-c", &format!("code=0\n{}", script.join("\n"))])
+        .envs([("HOME", home), ("RUNNER_TEMP", home)])
+        .envs([("SCENARIOS", scenarios), ("PRESET", "pr"), ("SEED", "1"), ("CONTROLLER", "exec:python3 my.py")])
+        .envs([("OPTIONS", options), ("OUT", "out")])
+        .env("GITHUB_OUTPUT", home.join("output"))
         .output()
-        .unwrap();
+        .unwrap()
+}
+
+#[test]
+#[cfg(unix)]
+fn the_action_carries_a_quoted_gate() {
+    let home = folder();
+    let options = "--gate 'upper(induced) <= 0.03' --max-induced 0 '$(touch x)'";
+    let job = step_of_campaign(home.path(), "a b", options);
     assert_eq!(job.status.code(), Some(1), "{job:?}");
     let words = String::from_utf8(job.stdout).unwrap();
     assert!(words.starts_with("<campaign><a><b><--preset>"), "{words}");
     assert!(words.contains("<--controller><exec:python3 my.py>"), "{words}");
     assert!(words.ends_with("<--gate><upper(induced) <= 0.03><--max-induced><0><$(touch x)>"), "{words}");
+    let without = step_of_campaign(home.path(), "a", "");
+    assert!(String::from_utf8(without.stdout).unwrap().ends_with("<--out><out>"), "no option is no word");
+}
+
+#[test]
+#[cfg(unix)]
+fn the_action_ends_with_an_error_if_a_quote_is_not_closed() {
+    let wrong = "--max-other-collisions 5 '--gate=upper(induced) <= 0.01";
+    for (scenarios, options, input) in [("a", wrong, "options"), ("a \"b", "", "scenarios"), ("a", "it's", "options")] {
+        let home = folder();
+        let job = step_of_campaign(home.path(), scenarios, options);
+        assert_eq!(job.status.code(), Some(2), "{job:?}");
+        assert_eq!(String::from_utf8_lossy(&job.stdout), "", "no campaign runs");
+        let told = String::from_utf8_lossy(&job.stderr).into_owned();
+        assert!(told.contains(&format!("::error::closecall: the input `{input}`")), "{told}");
+        assert_eq!(fs::read_to_string(home.path().join("output")).unwrap(), "exit-code=2\n");
+    }
+}
+
+/// No step reads words from a command whose failure the shell drops.
+#[test]
+fn no_step_reads_a_command_whose_failure_is_dropped() {
+    for path in GITHUB.iter().map(|(path, _)| *path).chain(EXAMPLES) {
+        let text = text(path);
+        for dropped in ["< <(", "<(words", "|| true"] {
+            assert!(!text.contains(dropped), "{path}: {dropped}");
+        }
+        let unquoted = |line: &&str| {
+            !line.trim_start().starts_with('#') && line.contains("closecall campaign $") && !line.contains("\"$")
+        };
+        assert_eq!(
+            text.lines().find(unquoted),
+            None,
+            "{path}: the words of a variable without quotes lose a quoted gate"
+        );
+    }
 }
 
 #[test]

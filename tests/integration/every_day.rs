@@ -9,7 +9,7 @@ use closecall_testing::has_python;
 use serde_json::Value;
 
 use crate::native_controllers::{compile, lib, with_fault};
-use crate::support::{closecall, code, folder, headline_with, json, message, program, stderr, stdout};
+use crate::support::{closecall, code, folder, headline_with, json, message, program, records, stderr, stdout};
 
 /// A step of a controller in Python that answers with `answer`.
 fn python(answer: &str) -> String {
@@ -250,6 +250,64 @@ fn a_campaign_that_grows_has_the_bytes_of_one_that_ran_at_once() {
 }
 
 #[test]
+fn a_sobol_sequence_goes_on_and_a_grid_says_why_it_does_not() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let campaign = |out: &str, design: &str, samples: &str, more: &[&str]| {
+        let mut command = program();
+        command.args(["campaign", "low-thw-overtake", "-n", samples, "--design", design, "--sensors", "ground-truth"]);
+        command
+            .args(["--no-gate", "--record", "worst:1", "--out", at(out).to_str().unwrap()])
+            .args(more)
+            .output()
+            .unwrap()
+    };
+    stdout(&campaign("once", "sobol", "12", &[]), 0);
+    stdout(&campaign("grown", "sobol", "5", &[]), 0);
+    let untouched = campaign("grown", "sobol", "12", &[]);
+    assert!(
+        code(&untouched) == 2 && stderr(&untouched).contains("already holds this campaign"),
+        "{}",
+        stderr(&untouched)
+    );
+    stdout(&campaign("grown", "sobol", "12", &["--resume"]), 0);
+    for ((name, content), (_, other)) in bytes(&at("once")).iter().zip(bytes(&at("grown"))) {
+        assert!(*content == other, "{name}");
+    }
+    stdout(&campaign("grid", "grid", "4", &[]), 0);
+    let refused = campaign("grid", "grid", "8", &["--resume"]);
+    assert_eq!(code(&refused), 2);
+    let told = message(&refused);
+    assert!(told.contains("4 there, 8 here (a grid does not grow: its points depend on their number)"), "{told}");
+}
+
+#[test]
+fn wherever_letters_name_vehicles_a_line_says_which() {
+    const KEY: &str = "E is the ego, F the lead vehicle, R the rear vehicle";
+    let folder = folder();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let plan = ["-n", "20", "--seed", "1", "--sensors", "object", "--controller", "acc", "--no-gate"];
+    stdout(&closecall(["campaign", "low-thw-overtake", "--out", out].iter().chain(&plan)), 0);
+    let sample = records(Path::new(out))
+        .into_iter()
+        .find(|record| record.arms[0].result.as_ref().is_ok_and(|outcome| outcome.ego_collided()));
+    let sample = sample.expect("the baseline collides in a fifth of the samples").sample.to_string();
+    let times = |text: &str| text.matches(KEY).count();
+    for file in ["report.html", "summary.md", "recordings/index.html"] {
+        assert_eq!(times(&fs::read_to_string(Path::new(out).join(file)).unwrap()), 1, "{file}");
+    }
+    for args in [["replay", out, sample.as_str()], ["explain", out, sample.as_str()]] {
+        let text = stdout(&closecall(&args), 0);
+        assert!(text.contains("R struck E") || text.contains("E struck F"), "{text}");
+        assert_eq!(times(&text), 1, "{text}");
+    }
+    let run = ["run", "low-thw-overtake", "--sensors", "object"];
+    assert_eq!(times(&stdout(&closecall(run.iter().chain(&["--paired"])), 0)), 1);
+    assert_eq!(times(&stdout(&closecall(run.iter().chain(&["--format", "json"])), 0)), 0);
+}
+
+#[test]
 fn a_resumption_that_fails_fast_ends_at_the_next_failing_sample_and_blames_no_journal() {
     let folder = folder();
     let out = folder.path().join("out");
@@ -268,6 +326,28 @@ fn a_resumption_that_fails_fast_ends_at_the_next_failing_sample_and_blames_no_jo
     stdout(&campaign(&["--resume"]), 0);
     assert_eq!(samples(), 60);
     stdout(&campaign(&["--resume", "--fail-fast"]), 0);
+}
+
+#[test]
+#[cfg(unix)]
+fn the_sizes_in_the_examples_of_the_help_decide() {
+    let mut examples = 0;
+    for help in [&["--help"][..], &["campaign", "--help"]] {
+        let text = stdout(&closecall(help), 0);
+        for line in text.lines().filter_map(|line| line.trim().strip_prefix("closecall campaign low-thw-overtake ")) {
+            let words = Command::new("sh").args(["-c", &format!("printf '%s\\n' {line}")]).output().unwrap();
+            let words = String::from_utf8(words.stdout).unwrap();
+            for seed in ["0", "1"] {
+                let more = ["--sensors", "object", "--no-validity-checks", "--seed", seed, "--no-out"];
+                let mut command = program();
+                command.args(["campaign", "low-thw-overtake"]).args(words.lines()).args(more);
+                let output = command.output().unwrap();
+                assert!([0, 1].contains(&code(&output)), "{line} --seed {seed}: {output:?}");
+            }
+            examples += 1;
+        }
+    }
+    assert_eq!(examples, 3, "one of the program, two of the command");
 }
 
 #[test]

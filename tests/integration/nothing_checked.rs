@@ -92,6 +92,16 @@ fn a_gate_on_what_no_sample_has_does_not_pass() {
 }
 
 #[test]
+fn the_sentence_for_programs_says_what_is_not_checked() {
+    let args =
+        ["campaign", "low-thw-overtake", "-n", "200", "--seed", "5", "--sensors", "object", "--max-collisions", "100"];
+    let told = json(&closecall(args.iter().chain(&["--format", "json"])), 0);
+    assert_eq!(told["verdict"], "PASS");
+    assert_eq!(told["sentence"], "PASS: 5 of 8 gates are met, 3 not checked");
+    assert!(stdout(&closecall(args), 0).contains(told["sentence"].as_str().unwrap()));
+}
+
+#[test]
 fn copies_of_one_sample_are_one_sample() {
     let args = ["campaign", "paper-figure", "-n", "1000", "--paired", "--max-probability", "0.3", "--format", "json"];
     let report = json(&closecall(args), 4);

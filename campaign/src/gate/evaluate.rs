@@ -2,6 +2,7 @@
 
 use closecall_scenarios::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, Operator, PairFlag, Quantity};
 use closecall_traffic::maths::powf;
+use closecall_traffic::statistics::binomial::{at_least, at_most};
 use closecall_traffic::statistics::needed::{MAX_SAMPLES, first_that_holds};
 use closecall_traffic::statistics::quantiles::quantile;
 
@@ -106,6 +107,43 @@ fn least_samples(aggregate: Aggregate, is_varied: bool) -> u64 {
 /// Largest number of samples that a percentile needs (-): the number for the 99.99th percentile.
 const MOST_ASKED: u64 = 29_956;
 
+/// What independent samples say beyond themselves about an extreme or a percentile, with the
+/// confidence of a bound and for any distribution of the values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Certainty {
+    /// At most this share of all such samples is beyond the extreme of these (-). A larger share
+    /// would have shown itself (S. S. Wilks, *Determination of Sample Sizes for Setting Tolerance
+    /// Limits*, Annals of Mathematical Statistics 12 (1941) 91–96).
+    ShareBeyond(f64),
+    /// One-sided bound of the percentile, on the side that the gate asks for: an order statistic
+    /// (H. A. David and H. N. Nagaraja, *Order Statistics*, 3rd edition, section 7.1).
+    PercentileBound(f64),
+}
+
+impl Certainty {
+    /// Returns the share that may be beyond the extreme of `samples` samples.
+    fn of_extreme(samples: u64) -> Self {
+        Self::ShareBeyond(1.0 - powf(1.0 - CONFIDENCE, 1.0 / samples as f64))
+    }
+
+    /// Returns the bound of a percentile of sorted values: from below for a criterion `>=`, from
+    /// above for `<=`. Returns `None` if there are too few values.
+    fn of_percentile(sorted: &[f64], percent: f64, operator: Operator) -> Option<Self> {
+        let (count, p) = (sorted.len() as u64, 0.01 * percent);
+        // The value of rank r is at most the percentile if at least r values are, and it is at least
+        // the percentile if at most r − 1 values are below.
+        let rank = match operator {
+            Operator::AtLeast => {
+                let fails = first_that_holds(1, count, |rank| at_least(rank, count, p) < CONFIDENCE);
+                fails.map_or(count, |rank| rank - 1)
+            }
+            Operator::AtMost => first_that_holds(1, count, |rank| at_most(rank - 1, count, p) >= CONFIDENCE)?,
+        };
+        let index = usize::try_from(rank.checked_sub(1)?).ok()?;
+        sorted.get(index).copied().map(Self::PercentileBound)
+    }
+}
+
 /// The value of a gate, with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evaluation {
@@ -113,6 +151,9 @@ pub struct Evaluation {
     pub value: Option<f64>,
     /// The two-sided 95 % interval of the share, for gates of flags.
     pub interval_95: Option<[f64; 2]>,
+    /// What the samples say beyond themselves; `None` for other values, and if the samples are not
+    /// independent or their number is not fixed in advance.
+    pub certainty: Option<Certainty>,
     /// Samples that have the quantity and satisfy the condition.
     pub samples: u64,
     /// Those of them that have the flag.
@@ -135,7 +176,7 @@ impl Evaluation {
             Some(_) => Answer::Missed,
         };
         let (value, samples) = covered.map_or((None, 0), |(share, samples)| (Some(share), samples));
-        Self { value, interval_95: None, samples, hits: 0, answer, needed: None }
+        Self { value, interval_95: None, certainty: None, samples, hits: 0, answer, needed: None }
     }
 }
 
@@ -187,6 +228,27 @@ impl Accumulator {
 
     /// Returns the result.
     pub fn evaluate(&self, evidence: &Evidence) -> Evaluation {
+        Evaluation { certainty: self.certainty(evidence), ..self.decide(evidence) }
+    }
+
+    fn certainty(&self, evidence: &Evidence) -> Option<Certainty> {
+        let is_independent =
+            evidence.is_varied && !evidence.is_weighted && evidence.inference == Inference::FixedSamples;
+        // What is not a number is in the sum.
+        if !is_independent || self.samples == 0 || self.sum.is_nan() {
+            return None;
+        }
+        match self.expression.aggregate {
+            Aggregate::Min | Aggregate::Max => Some(Certainty::of_extreme(self.samples)),
+            Aggregate::Percentile(percent) => {
+                Certainty::of_percentile(&sorted(&self.values), percent, self.expression.operator)
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the result without what it says beyond the samples.
+    fn decide(&self, evidence: &Evidence) -> Evaluation {
         let Evidence { is_paired, is_varied, is_built_in, inference, is_weighted } = *evidence;
         let Expression { aggregate, operator, bound, .. } = self.expression;
         let (hits, samples) = (self.hits, self.samples);
@@ -194,8 +256,8 @@ impl Accumulator {
             .then(|| inference.interval_95(hits, samples))
             .flatten();
         let value = (samples > 0 || aggregate == Aggregate::Count).then(|| self.value(inference)).flatten();
-        let open =
-            |reason| Evaluation { value, interval_95, samples, hits, answer: Answer::Open(reason), needed: None };
+        let whole = |answer, needed| Evaluation { value, interval_95, certainty: None, samples, hits, answer, needed };
+        let open = |reason| whole(Answer::Open(reason), None);
         if self.expression.needs_pairs() && !is_paired {
             return open(OpenReason::NotPaired);
         }
@@ -233,20 +295,20 @@ impl Accumulator {
         let of_bound = || if is_bound { self.needed(inference) } else { Some(least_samples(aggregate, is_varied)) };
         let of_all = |needed: u64| needed.saturating_mul(self.added.max(samples)).div_ceil(samples);
         let needed = is_open.then(of_bound).flatten().map(of_all);
-        Evaluation { value, interval_95, samples, hits, answer, needed }
+        whole(answer, needed)
     }
 
     /// Returns true if the gate fails whatever the remaining `rest` samples are, even the most
     /// favourable ones. Returns false for a sum, a mean and a percentile.
     pub fn is_lost(&self, evidence: &Evidence, rest: u64) -> bool {
         let Expression { aggregate, operator, .. } = self.expression;
-        if evidence.inference != Inference::FixedSamples || self.evaluate(evidence).answer != Answer::Missed {
+        if evidence.inference != Inference::FixedSamples || self.decide(evidence).answer != Answer::Missed {
             return false;
         }
         let favourable = || {
             let hits = self.hits + if operator == Operator::AtLeast { rest } else { 0 };
             let samples = self.samples + rest;
-            Self { hits, samples, ..Self::new(self.expression) }.evaluate(evidence).answer == Answer::Missed
+            Self { hits, samples, ..Self::new(self.expression) }.decide(evidence).answer == Answer::Missed
         };
         match (aggregate, operator) {
             // A count or an extreme beyond its bound stays there.
@@ -312,9 +374,14 @@ fn percentile(values: &[f64], percent: f64) -> Option<f64> {
     if values.iter().any(|value| value.is_nan()) {
         return Some(f64::NAN);
     }
+    let sorted = sorted(values);
+    (!sorted.is_empty()).then(|| quantile(&sorted, 0.01 * percent))
+}
+
+fn sorted(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    (!sorted.is_empty()).then(|| quantile(&sorted, 0.01 * percent))
+    sorted
 }
 
 /// Returns the value of a quantity in one sample; `None` if the sample does not have it.
@@ -427,6 +494,50 @@ mod tests {
         {
             assert_eq!(answer(gate), Answer::Open(OpenReason::WeightedSamples), "{gate}");
         }
+    }
+
+    #[test]
+    fn an_extreme_and_a_percentile_say_how_sure_they_are() {
+        let evidence = Evidence {
+            is_paired: false,
+            is_varied: true,
+            is_built_in: [true; 2],
+            inference: Inference::FixedSamples,
+            is_weighted: false,
+        };
+        let certainty = |gate: &str, values: &[f64], evidence: &Evidence| {
+            let expression: Expression = gate.parse().unwrap();
+            let samples = values.len() as u64;
+            let sum = values.iter().sum();
+            Accumulator { samples, sum, values: values.to_vec(), ..Accumulator::new(expression) }.certainty(evidence)
+        };
+        let values: Vec<f64> = (1..=299).rev().map(f64::from).collect();
+        // 59 samples reach beyond the 95th percentile with 95 % confidence, and 58 do not.
+        for (count, is_within) in [(58, false), (59, true)] {
+            let Some(Certainty::ShareBeyond(share)) = certainty("max(max_jerk_mps3) <= 5", &values[..count], &evidence)
+            else {
+                panic!("an extreme has a share");
+            };
+            assert_eq!(share <= 0.05, is_within, "{count}: {share}");
+        }
+        let bound = |gate: &str, count: usize| certainty(gate, &values[..count], &evidence);
+        assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 299), Some(Certainty::PercentileBound(1.0)));
+        assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 298), None, "the smallest of 298 may be above");
+        assert_eq!(bound("p99(max_jerk_mps3) <= 5", 299), Some(Certainty::PercentileBound(299.0)));
+        assert_eq!(bound("p99(max_jerk_mps3) <= 5", 298), None);
+        // The median of 100 values from 200 to 299, of ranks 42 and 59 (binomial distribution with 1/2).
+        assert_eq!(bound("p50(max_jerk_mps3) >= 5", 100), Some(Certainty::PercentileBound(241.0)));
+        assert_eq!(bound("p50(max_jerk_mps3) <= 5", 100), Some(Certainty::PercentileBound(258.0)));
+        assert_eq!(bound("p100(max_jerk_mps3) <= 5", 299), None, "no sample shows the largest value of all");
+        for gate in ["mean(max_jerk_mps3) <= 5", "sum(harm) <= 5", "count(engaged) <= 5"] {
+            assert_eq!(bound(gate, 299), None, "{gate}");
+        }
+        let of_design = Evidence { inference: Inference::Design, ..evidence };
+        let of_one = Evidence { is_varied: false, ..evidence };
+        for other in [of_design, of_one] {
+            assert_eq!(certainty("max(max_jerk_mps3) <= 5", &values, &other), None);
+        }
+        assert_eq!(certainty("max(max_jerk_mps3) <= 5", &[1.0, f64::NAN], &evidence), None);
     }
 
     #[test]

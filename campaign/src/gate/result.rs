@@ -6,7 +6,7 @@ use closecall_scenarios::criteria::{Expression, FlagName};
 use closecall_traffic::statistics::format::without_trailing_zeros;
 use closecall_traffic::words::counted;
 
-use super::evaluate::{Answer, Evaluation};
+use super::evaluate::{Answer, Evaluation, OpenReason};
 use super::set::GateSource;
 
 /// How a requirement or a gate fares; graver results last.
@@ -53,7 +53,7 @@ impl GateResult {
         match self.evaluation.answer {
             Answer::Met => Standing::Pass,
             Answer::Missed => Standing::Fail,
-            Answer::Open(super::OpenReason::NotPaired | super::OpenReason::NotInCoverage) => Standing::NotChecked,
+            Answer::Open(OpenReason::NotPaired | OpenReason::NotInCoverage) => Standing::NotChecked,
             Answer::Open(_) => Standing::Inconclusive,
         }
     }
@@ -105,15 +105,18 @@ impl Evaluation {
     /// Returns why the samples do not decide, and how many would; `None` if they decide.
     pub fn undecided(&self) -> Option<String> {
         let Answer::Open(reason) = self.answer else { return None };
-        let more = match self.needed {
-            Some(needed) => format!(", some {} would if they are like these", rounded_up(needed)),
-            None if reason == super::OpenReason::TooFewSamples => {
-                ", and no number would if they are like these".to_owned()
-            }
-            None => String::new(),
-        };
-        Some(format!("{}{more}", reason.text()))
+        Some(undecided(reason, self.needed))
     }
+}
+
+/// Returns why samples do not decide, and how many would, in words.
+pub(crate) fn undecided(reason: OpenReason, needed: Option<u64>) -> String {
+    let more = match needed {
+        Some(needed) => format!(", some {} would if they are like these", rounded_up(needed)),
+        None if reason == OpenReason::TooFewSamples => ", and no number would if they are like these".to_owned(),
+        None => String::new(),
+    };
+    format!("{}{more}", reason.text())
 }
 
 /// Returns a number of samples with its first two digits, rounded up: the rest of it rests on a share that is not known better.

@@ -16,6 +16,7 @@ use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::summary::{Counts, Summary};
+use closecall_scenarios::causal::LETTERS;
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::shown::shown;
 use closecall_traffic::statistics::format::percent;
@@ -74,7 +75,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         .map(|setting| format!(", with <code>{}</code>", in_markdown(&setting.to_string())))
         .collect();
     text.push_str(&format!(
-        "<sub>Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design{settings}, \
+        "<sub>{LETTERS}. Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design{settings}, \
          closecall {version}.</sub>\n",
         sampling.seed, sampling.design,
     ));

@@ -8,7 +8,7 @@
 //!
 //! The page, the summary and the terminal have the same words in the same order.
 
-use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource, Standing};
+use closecall_campaign::gate::{Answer, Certainty, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::criteria::{Aggregate, Comparison, Operator, Quantity, Side};
 use closecall_traffic::statistics::format::{DIGITS, percent, significant, without_trailing_zeros};
@@ -129,7 +129,7 @@ pub(crate) fn gate_line(gate: &GateResult) -> String {
 /// Returns the value of a gate and its required value, in plain words.
 pub(crate) fn gate_words(gate: &GateResult) -> String {
     let expression = &gate.expression;
-    let Evaluation { value, interval_95, samples, hits, .. } = gate.evaluation;
+    let Evaluation { value, interval_95, certainty, samples, hits, .. } = gate.evaluation;
     let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
     let condition =
         expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
@@ -149,18 +149,63 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
         Operator::AtLeast => "at least",
         Operator::AtMost => "at most",
     };
-    let estimate = || format!("{hits} of {samples} ({})", percent(hits as f64 / samples as f64));
-    let interval = interval_95
-        .map_or_else(String::new, |[low, high]| format!(", 95 % interval {} to {}", percent(low), percent(high)));
+    let share = || percent(hits as f64 / samples as f64);
+    let interval = interval_95.map_or_else(String::new, |[low, high]| {
+        format!(", two-sided 95 % interval {} to {}", percent(low), percent(high))
+    });
+    let of_samples = counted(samples, "sample");
     let is = match (expression.aggregate, value) {
-        (_, None) => format!("has no value ({})", counted(samples, "sample")),
-        (Aggregate::Lower, Some(value)) => format!("{}, one-sided lower 95 % bound {}", estimate(), shown(value)),
-        (Aggregate::Upper, Some(value)) => format!("{}, one-sided upper 95 % bound {}", estimate(), shown(value)),
-        (Aggregate::Share, Some(_)) => format!("{}{interval}", estimate()),
-        (_, Some(value)) => format!("{} ({}{interval})", shown(value), counted(samples, "sample")),
+        (_, None) => format!("has no value ({of_samples})"),
+        (Aggregate::Lower, Some(value)) => {
+            format!("{hits} of {samples} ({}), one-sided lower 95 % bound {}", share(), shown(value))
+        }
+        (Aggregate::Upper, Some(value)) => {
+            format!("{hits} of {samples} ({}), one-sided upper 95 % bound {}", share(), shown(value))
+        }
+        (Aggregate::Share, Some(_)) => {
+            format!("{hits} of {samples} ({}{interval}; the point estimate decides)", share())
+        }
+        (Aggregate::Count, Some(value)) if samples > 0 => {
+            format!("{} ({of_samples}, share {}{interval}; the count decides)", shown(value), share())
+        }
+        (Aggregate::Count | Aggregate::Coverage, Some(value)) => format!("{} ({of_samples})", shown(value)),
+        (Aggregate::Min, Some(value)) => {
+            format!("{} (smallest of {of_samples}{})", shown(value), beyond(certainty, "below"))
+        }
+        (Aggregate::Max, Some(value)) => {
+            format!("{} (largest of {of_samples}{})", shown(value), beyond(certainty, "above"))
+        }
+        (Aggregate::Mean, Some(value)) => {
+            format!("{} (point estimate from {of_samples}, without a confidence bound)", shown(value))
+        }
+        (Aggregate::Sum, Some(value)) => {
+            format!("{} (sum over {of_samples}, without a confidence bound)", shown(value))
+        }
+        (Aggregate::Percentile(_), Some(value)) => {
+            let side = match expression.operator {
+                Operator::AtLeast => "lower",
+                Operator::AtMost => "upper",
+            };
+            let bound = match certainty {
+                Some(Certainty::PercentileBound(bound)) => format!("one-sided {side} 95 % bound {}", shown(bound)),
+                _ => "without a confidence bound".to_owned(),
+            };
+            format!("{} (point estimate from {of_samples}, {bound}; the point estimate decides)", shown(value))
+        }
     };
     let open = gate.evaluation.undecided().map_or_else(String::new, |why| format!(" ({why})"));
     format!("{subject}{condition}: {is}{open}; required: {sides} {bound}")
+}
+
+/// Returns what the samples say beyond their extreme, as the end of its words. `side` is where the
+/// values beyond it are.
+fn beyond(certainty: Option<Certainty>, side: &str) -> String {
+    match certainty {
+        Some(Certainty::ShareBeyond(share)) => {
+            format!("; with 95 % confidence, at most {} of such samples are {side} it", percent(share))
+        }
+        _ => ", which says nothing about others".to_owned(),
+    }
 }
 
 /// Returns the judged quantity in words, and whether it is a share.
@@ -256,6 +301,7 @@ mod tests {
             evaluation: Evaluation {
                 value: Some(value),
                 interval_95: Some([0.2, 0.4]),
+                certainty: None,
                 samples: 60,
                 hits: 18,
                 answer,
@@ -336,10 +382,59 @@ mod tests {
     #[test]
     fn a_measured_value_has_three_digits_unless_they_hide_that_it_misses_its_bound() {
         let jerk = gate("a", "max(max_jerk_mps3) <= 10", None, 31.0825, Answer::Missed);
-        assert!(gate_words(&jerk).contains(": 31.1 m/s³ (60 samples"), "{}", gate_words(&jerk));
+        assert!(gate_words(&jerk).contains(": 31.1 m/s³ (largest of 60 samples"), "{}", gate_words(&jerk));
         let texts = [(10.004, 10.0), (9.9996, 10.0), (10.0, 10.0), (0.123_456, 1.0)]
             .map(|(value, bound)| measured(value, bound));
         assert_eq!(texts, ["10.004", "9.9996", "10", "0.123"]);
+    }
+
+    #[test]
+    fn every_aggregate_says_how_sure_its_value_is() {
+        let words = |text: &str, certainty: Option<Certainty>| {
+            let mut gate = gate("a", text, None, 18.0, Answer::Met);
+            gate.evaluation.certainty = certainty;
+            let words = gate_words(&gate);
+            let measured = words.split_once(": 18").map_or("", |(_, rest)| rest).split("; required").next();
+            measured.unwrap_or_default().to_owned()
+        };
+        let share = Some(Certainty::ShareBeyond(0.0487));
+        for (text, certainty, expected) in [
+            (
+                "count(ego_collided) <= 20",
+                None,
+                " (60 samples, share 30 %, two-sided 95 % interval 20 % to 40 %; the count decides)",
+            ),
+            (
+                "share(ego_collided) <= 0.5",
+                None,
+                " of 60 (30 %, two-sided 95 % interval 20 % to 40 %; the point estimate decides)",
+            ),
+            (
+                "max(max_jerk_mps3) <= 20",
+                share,
+                " m/s³ (largest of 60 samples; with 95 % confidence, at most 4.87 % of such samples are above it)",
+            ),
+            (
+                "min(min_ttc_rear_s) >= 1",
+                share,
+                " s (smallest of 60 samples; with 95 % confidence, at most 4.87 % of such samples are below it)",
+            ),
+            ("max(max_jerk_mps3) <= 20", None, " m/s³ (largest of 60 samples, which says nothing about others)"),
+            ("mean(min_ttc_rear_s) >= 1", None, " s (point estimate from 60 samples, without a confidence bound)"),
+            ("sum(max_jerk_mps3) <= 20", None, " m/s³ (sum over 60 samples, without a confidence bound)"),
+            (
+                "p5(min_ttc_rear_s) >= 1",
+                Some(Certainty::PercentileBound(12.5)),
+                " s (point estimate from 60 samples, one-sided lower 95 % bound 12.5 s; the point estimate decides)",
+            ),
+            (
+                "p95(max_jerk_mps3) <= 20",
+                Some(Certainty::PercentileBound(19.5)),
+                " m/s³ (point estimate from 60 samples, one-sided upper 95 % bound 19.5 m/s³; the point estimate decides)",
+            ),
+        ] {
+            assert_eq!(words(text, certainty), expected, "{text}");
+        }
     }
 
     #[test]
@@ -350,8 +445,8 @@ mod tests {
         let words = gate_words(&judgement.gates[0]);
         assert_eq!(
             words,
-            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (60 samples, 95 % interval 20 % to 40 %) (too few \
-             samples to decide, and no number would if they are like these); required: at least 1 s"
+            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (point estimate from 60 samples, without a \
+             confidence bound; the point estimate decides) (too few samples to decide, and no number would if they are like these); required: at least 1 s"
         );
         let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);
         assert_eq!(sentence(&met, 1), "PASS: the scenario meets what is required, 1 of 1 gates");

@@ -14,7 +14,7 @@ use super::influence::influence;
 use super::stamp::stamped;
 use crate::campaign::coverage::coverage_json;
 use crate::campaign::overview::{ErrorGroup, Overview, ScenarioOverview};
-use crate::campaign::words::reasons;
+use crate::campaign::words::{reasons, sentence};
 use crate::campaign::{CampaignReport, ensemble_json};
 
 /// Returns the result of a campaign: its counts, its verdict, the influence of parameters, and its
@@ -57,6 +57,7 @@ pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> V
         unpool(&mut object, summary);
     }
     object.insert("verdict".to_owned(), json!(judged.verdict()));
+    object.insert("sentence".to_owned(), json!(sentence(judged, summary.scenarios.len())));
     object.insert("gates".to_owned(), json!(judged.gates.iter().map(gate).collect::<Vec<_>>()));
     object.insert("requirements".to_owned(), json!(judged.requirements.iter().map(requirement).collect::<Vec<_>>()));
     object.insert("expectations".to_owned(), json!(judged.expectations.iter().map(expectation).collect::<Vec<_>>()));
@@ -99,7 +100,7 @@ fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
 }
 
 fn gate(gate: &GateResult) -> Value {
-    let Evaluation { value, interval_95, samples, hits, answer, needed } = gate.evaluation;
+    let Evaluation { value, interval_95, samples, hits, answer, needed, .. } = gate.evaluation;
     let passed = match answer {
         Answer::Met => Some(true),
         Answer::Missed => Some(false),

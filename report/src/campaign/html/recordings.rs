@@ -10,6 +10,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::page::{document, table};
 use crate::campaign::recordings::card_beside;
+use closecall_scenarios::causal::LETTERS;
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::shown::shown;
@@ -61,7 +62,7 @@ fn page(entries: &[IndexEntry], command_for: CommandFor) -> Markup {
         p {
             (entries.len()) @if entries.len() == 1 { " recorded sample. " } @else { " recorded samples. " }
             "Each picture shows the critical moment from above: the vehicles drive to "
-            "the right, and the road is drawn wider than it is. The recordings open in the Rerun viewer 0.36:"
+            "the right, and the road is drawn wider than it is. " (LETTERS) ". The recordings open in the Rerun viewer 0.36:"
         }
         pre.command tabindex="0" { "pip install rerun-sdk==0.36.3" }
         p {

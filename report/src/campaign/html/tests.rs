@@ -105,6 +105,7 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
         "<a href=\"#part-0\">Gates</a>",
         "FAIL: the scenario misses a ",
         "R struck E from behind",
+        "E is the ego, F the lead vehicle, R the rear vehicle",
         "recordings/low-thw-overtake-1.html",
         "Signature",
         "page written on",

@@ -7,6 +7,7 @@ use crate::campaign::findings::Findings;
 use crate::campaign::words::{gate_words, is_said, sentence, worst_first};
 use closecall_campaign::gate::{GateResult, Standing};
 use closecall_campaign::verdict::Verdict;
+use closecall_scenarios::causal::LETTERS;
 use closecall_traffic::words::counted;
 
 const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
@@ -40,6 +41,7 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
                     @if let Some(part) = findings.manifest.partition { ", part " (part.to_string()) }
                 }
                 ul { @for reason in judged.reasons.iter().filter(is_below) { li { (reason) } } }
+                p.what { (LETTERS) "." }
                 p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
             }
         }

@@ -8,7 +8,7 @@ use closecall_traffic::{Measured, Time};
 use crate::run::film::{Film, fate_word, headway_text, headways};
 use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
-use closecall_scenarios::causal::CausalSentence;
+use closecall_scenarios::causal::{CausalSentence, LETTERS};
 
 /// Returns the verdict in Markdown: the event, how close it was, and the actions of the system.
 pub(super) fn verdict(films: &[Film]) -> String {
@@ -27,7 +27,8 @@ pub(super) fn verdict(films: &[Film]) -> String {
     page
 }
 
-/// Returns the story in Markdown: the events of each film, then the table of each film.
+/// Returns the story in Markdown: the events of each film, the table of each film, and the key of
+/// the letters.
 pub(super) fn story(films: &[Film]) -> String {
     let mut page = String::new();
     for film in films {
@@ -35,6 +36,10 @@ pub(super) fn story(films: &[Film]) -> String {
     }
     for film in films {
         push_table(&mut page, film);
+    }
+    if films.iter().any(|film| film.outcome.is_some()) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(page, "\n{LETTERS}.");
     }
     page
 }
