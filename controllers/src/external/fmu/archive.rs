@@ -225,11 +225,7 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     for (name, index) in &entries {
         let mut entry = archive.by_index(*index).map_err(broken)?;
         let target = folder.path.join(name);
-        if let Some(parent) = target.parent() {
-            std::fs::create_dir_all(parent).map_err(read)?;
-        }
-        let mut file = File::create(&target).map_err(read)?;
-        copy_bounded(&mut entry, &mut file, (&mut left, started)).map_err(|error| match error.kind() {
+        let file = write_file(&mut entry, &target, (&mut left, started)).map_err(|error| match error.kind() {
             // The content is compressed in another way than its header says.
             io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
                 refuse(format!("its archive is damaged in `{name}`: {error}"))
@@ -250,6 +246,18 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     Ok(Unpacked { description, binary: place.join(binary), place, folder: Some(folder) })
 }
 
+/// Writes a file of an archive, and the folders above it. `left` is the number of bytes that may still be written.
+fn write_file(from: &mut impl Read, target: &Path, (left, started): (&mut u64, Instant)) -> io::Result<File> {
+    // Empty files and folders take time, too.
+    check_time(started)?;
+    if let Some(parent) = target.parent() {
+        std::fs::create_dir_all(parent)?;
+    }
+    let mut file = File::create(target)?;
+    copy_bounded(from, &mut file, (left, started))?;
+    Ok(file)
+}
+
 /// Copies a file of an archive. `left` is the number of bytes that may still be written.
 fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mut u64, Instant)) -> io::Result<()> {
     const CHUNK_BYTES: usize = 1 << 16;
@@ -263,12 +271,18 @@ fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mu
             let message = format!("it holds more than the {} MiB that are unpacked", MOST_BYTES >> 20);
             io::Error::new(io::ErrorKind::FileTooLarge, message)
         })?;
-        if started.elapsed() > LONGEST {
-            let message = format!("it takes longer to unpack than the {} s allowed", LONGEST.as_secs());
-            return Err(io::Error::new(io::ErrorKind::TimedOut, message));
-        }
+        check_time(started)?;
         to.write_all(&chunk[..read])?;
     }
+}
+
+/// Returns an error if unpacking takes too long. It began at `started`.
+fn check_time(started: Instant) -> io::Result<()> {
+    if started.elapsed() <= LONGEST {
+        return Ok(());
+    }
+    let message = format!("it takes longer to unpack than the {} s allowed", LONGEST.as_secs());
+    Err(io::Error::new(io::ErrorKind::TimedOut, message))
 }
 
 /// Returns the name of a file in the notation of the standard: with slashes, and without `./`. Some
@@ -367,6 +381,19 @@ mod tests {
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
         copy_bounded(&mut [0; 10].as_slice(), &mut written, (&mut left, Instant::now())).unwrap();
         assert_eq!((left, written.len()), (0, 10));
+    }
+
+    #[test]
+    fn the_time_of_empty_files_is_bounded_too() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("resources/deep/empty");
+        let (mut left, long_ago) = (10, Instant::now().checked_sub(LONGEST + Duration::from_secs(1)).unwrap());
+        let error = write_file(&mut io::empty(), &target, (&mut left, long_ago)).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        assert!(error.to_string().contains("longer to unpack than the 60 s allowed"), "{error}");
+        assert!(!place.path().join("resources").exists());
+        write_file(&mut io::empty(), &target, (&mut left, Instant::now())).unwrap();
+        assert!(target.is_file());
     }
 
     #[test]
