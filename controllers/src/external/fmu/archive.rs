@@ -5,7 +5,7 @@ use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError, TryLockError};
 use std::time::{Duration, Instant, SystemTime};
 
 use closecall_traffic::input;
@@ -146,10 +146,23 @@ pub(crate) fn unpacked_for_children(path: &Path) -> Result<PathBuf, LoadError> {
     Ok(place)
 }
 
-/// Removes what this process has unpacked for others.
+/// Time that the end of the program waits for an FMU that is being unpacked, and the interval at which it looks.
+const END_WAIT: Duration = Duration::from_millis(500);
+const END_POLL: Duration = Duration::from_millis(10);
+
+/// Removes what this process has unpacked for others. An FMU that is being unpacked keeps neither Ctrl-C nor SIGTERM waiting:
+/// the next process removes its folder as an abandoned one, see [`remove_abandoned`].
 pub(crate) fn remove_unpacked() {
-    let unpacked = std::mem::take(&mut *UNPACKED.lock().unwrap_or_else(PoisonError::into_inner));
-    drop(unpacked);
+    let begun = Instant::now();
+    let mut unpacked = loop {
+        match UNPACKED.try_lock() {
+            Ok(unpacked) => break unpacked,
+            Err(TryLockError::Poisoned(poisoned)) => break poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) if begun.elapsed() > END_WAIT => return,
+            Err(TryLockError::WouldBlock) => std::thread::sleep(END_POLL),
+        }
+    };
+    drop(std::mem::take(&mut *unpacked));
 }
 
 /// Returns the unpacked FMU: the folder that the parent process has unpacked, or a new folder.
@@ -394,6 +407,18 @@ mod tests {
         assert!(!place.path().join("resources").exists());
         write_file(&mut io::empty(), &target, (&mut left, Instant::now())).unwrap();
         assert!(target.is_file());
+    }
+
+    #[test]
+    fn the_end_of_the_program_does_not_wait_for_an_fmu_that_is_being_unpacked() {
+        let unpacking = UNPACKED.lock().unwrap_or_else(PoisonError::into_inner);
+        // Another thread holds the lock, as it is held when a signal arrives.
+        std::thread::scope(|scope| {
+            scope.spawn(remove_unpacked).join().unwrap();
+        });
+        drop(unpacking);
+        remove_unpacked();
+        assert!(UNPACKED.lock().unwrap_or_else(PoisonError::into_inner).is_empty());
     }
 
     #[test]
