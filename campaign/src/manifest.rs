@@ -294,11 +294,12 @@ impl Manifest {
         programs
     }
 
-    /// Returns the values of `sensors.perception` in the texts of the scenarios, each once, without the built-in chain.
+    /// Returns the values of `sensors.perception` in the texts of the scenarios, each once, without
+    /// the built-in chain.
     ///
-    /// The rest of a text does not matter. [`Self::programs`] misses the program of a text that is no scenario at this
-    /// moment. Such a text may be a scenario elsewhere: beside another file, or with sampled values in place of the
-    /// nominal ones.
+    /// The rest of a text does not matter. [`Self::programs`] misses the program of a text that is
+    /// no scenario at this moment. Such a text may be a scenario elsewhere: beside another file, or
+    /// with sampled values in place of the nominal ones.
     pub(crate) fn perceptions(&self) -> Vec<String> {
         let mut perceptions: Vec<String> = Vec::new();
         for scenario in &self.scenarios {

@@ -104,8 +104,8 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
     assert_eq!(code(&run(&mut user(&user_folder), &["replay", "moved", "1"])), 2);
 }
 
-/// The text of the scenario in a foreign manifest can be one that is a scenario in that folder only, or for some samples
-/// only. Its program needs the same trust.
+/// The text of the scenario in a foreign manifest can be one that is a scenario in that folder
+/// only, or for some samples only. Its program needs the same trust.
 #[test]
 fn a_program_that_a_foreign_scenario_hides_does_not_run() {
     let place = folder();

@@ -255,7 +255,8 @@ fn line(message: &impl serde::Serialize) -> Vec<u8> {
 /// samples before.
 fn failure(error: &ExecError) -> SampleFailure {
     let message = match error {
-        // Neither does the number of answers belong in it, nor the line, which names another question.
+        // Neither does the number of answers belong in it, nor the line, which names another
+        // question.
         ExecError::OutOfTurn { .. } => {
             "the controller failed: its process wrote a line that nobody had asked for".to_owned()
         }

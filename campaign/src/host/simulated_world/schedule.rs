@@ -208,7 +208,8 @@ impl Setup {
         Ok((machine.faults(), verdict))
     }
 
-    /// Checks that each record of the journal has the outcome of its own sample, and no broken check.
+    /// Checks that each record of the journal has the outcome of its own sample, and no broken
+    /// check.
     fn check_outcomes(&self, path: &Path) -> Result<(), Violation> {
         for entry in journal::read(&path.join(JOURNAL)).unwrap() {
             let Entry::Record { record, .. } = entry.unwrap() else { break };
@@ -288,8 +289,8 @@ impl Setup {
         Ok(true)
     }
 
-    /// Compares the finished campaign with an undisturbed campaign, except for the notes of crashes. A check that took
-    /// too long has run again.
+    /// Compares the finished campaign with an undisturbed campaign, except for the notes of
+    /// crashes. A check that took too long has run again.
     fn compare_with_undisturbed(&self, path: &Path, end: Option<Verdict>) -> Result<(), Violation> {
         let mut there = journal_lines(path);
         there.iter_mut().flat_map(|record| &mut record.arms).for_each(|arm| arm.flaky = None);

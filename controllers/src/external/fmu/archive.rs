@@ -146,12 +146,14 @@ pub(crate) fn unpacked_for_children(path: &Path) -> Result<PathBuf, LoadError> {
     Ok(place)
 }
 
-/// Time that the end of the program waits for an FMU that is being unpacked, and the interval at which it looks.
+/// Time that the end of the program waits for an FMU that is being unpacked, and the interval at
+/// which it looks.
 const END_WAIT: Duration = Duration::from_millis(500);
 const END_POLL: Duration = Duration::from_millis(10);
 
-/// Removes what this process has unpacked for others. An FMU that is being unpacked keeps neither Ctrl-C nor SIGTERM waiting:
-/// the next process removes its folder as an abandoned one, see [`remove_abandoned`].
+/// Removes what this process has unpacked for others. An FMU that is being unpacked keeps neither
+/// Ctrl-C nor SIGTERM waiting: the next process removes its folder as an abandoned one, see
+/// [`remove_abandoned`].
 pub(crate) fn remove_unpacked() {
     let begun = Instant::now();
     let mut unpacked = loop {
@@ -259,7 +261,8 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     Ok(Unpacked { description, binary: place.join(binary), place, folder: Some(folder) })
 }
 
-/// Writes a file of an archive, and the folders above it. `left` is the number of bytes that may still be written.
+/// Writes a file of an archive, and the folders above it. `left` is the number of bytes that may
+/// still be written.
 fn write_file(from: &mut impl Read, target: &Path, (left, started): (&mut u64, Instant)) -> io::Result<File> {
     // Empty files and folders take time, too.
     check_time(started)?;

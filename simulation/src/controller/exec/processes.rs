@@ -243,9 +243,9 @@ pub(super) fn descendants(process: u32) -> Vec<u32> {
     tree.split_off(1)
 }
 
-/// Returns the descendants of a controller whose parents have ended, such as a process that a controller sends into the
-/// background. There are none if this program does not adopt them: see [`adopt_orphans`]. A process that has cleared its
-/// environment is not among them.
+/// Returns the descendants of a controller whose parents have ended, such as a process that a
+/// controller sends into the background. There are none if this program does not adopt them: see
+/// [`adopt_orphans`]. A process that has cleared its environment is not among them.
 pub(super) fn orphans(entry: &Entry) -> Vec<u32> {
     let registry = lock();
     if !registry.adopts {
