@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
-use closecall_sensors::external::{ProgramKind, ProgramSettings};
+use closecall_sensors::external::{BUILT_IN, ProgramKind, ProgramSettings};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_traffic::input;
@@ -316,13 +316,31 @@ impl Manifest {
         programs
     }
 
+    /// Returns the values of `sensors.perception` in the texts of the scenarios, each once, without
+    /// the built-in chain.
+    ///
+    /// The rest of a text does not matter. [`Self::programs`] misses the program of a text that is
+    /// no scenario at this moment. Such a text may be a scenario elsewhere: beside another file, or
+    /// with sampled values in place of the nominal ones.
+    pub(crate) fn perceptions(&self) -> Vec<String> {
+        let mut perceptions: Vec<String> = Vec::new();
+        for scenario in &self.scenarios {
+            // A text that is not TOML runs nothing.
+            let text = toml::from_str::<toml::Table>(&scenario.text).unwrap_or_default();
+            let perception = text.get("sensors").and_then(|sensors| sensors.get("perception"));
+            let named = perception.and_then(toml::Value::as_str).filter(|name| *name != BUILT_IN);
+            perceptions.extend(named.map(str::to_owned).filter(|name| !perceptions.contains(name)));
+        }
+        perceptions
+    }
+
     /// Returns the commands, libraries and FMUs that the arms and the sensors run.
     pub fn foreign_code(&self) -> Vec<String> {
         let arms = self.arms.iter().filter(|arm| arm.exec().is_some() || arm.native().is_some());
-        let programs = self.programs();
         // An object of a Python program is not in the folder.
-        let named = programs.iter().filter(|program| program.kind != ProgramKind::Hosted).map(ProgramSettings::name);
-        arms.map(ToString::to_string).chain(named).collect()
+        let is_hosted = |name: &String| ProgramKind::split(name).is_some_and(|(kind, _)| kind == ProgramKind::Hosted);
+        let perceptions = self.perceptions().into_iter().filter(|name| !is_hosted(name));
+        arms.map(ToString::to_string).chain(perceptions).collect()
     }
 
     /// Returns the arms, the baseline first.
@@ -526,6 +544,37 @@ mod tests {
         assert_eq!(said(&with(10, Design::Random), &with(20, Design::Random)), "sampling.samples: 10 there, 20 here");
         let other_seed = Manifest { sampling: Sampling { seed: 2, ..with(10, Design::Grid).sampling }, ..manifest() };
         assert_eq!(said(&with(10, Design::Grid), &other_seed), "sampling.seed: 1 there, 2 here");
+    }
+
+    /// A folder could else hide the program from the question whether it may run, and run it.
+    #[test]
+    fn a_program_is_named_whatever_else_is_wrong_with_the_scenario() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
+        let library = std::fs::read_to_string(path).unwrap();
+        let with = |sensors: &str| {
+            let mut manifest = manifest();
+            manifest.scenarios[0].text = library.replacen("[sensors]\n", &format!("[sensors]\n{sensors}\n"), 1);
+            manifest
+        };
+        let program = "perception = \"exec:sh evil.sh\"";
+        let hidden = [
+            String::new(),
+            // A file that is beside the scenario in the folder only.
+            "rear-lidar.pattern-file = \"beside.toml\"".to_owned(),
+            // A parameter that some samples only have in the allowed range.
+            "rear-lidar.mount-height-m = \"$no-such-parameter\"".to_owned(),
+            "no-such-key = 1".to_owned(),
+        ];
+        for (index, more) in hidden.iter().enumerate() {
+            let manifest = with(&format!("{program}\n{more}"));
+            assert_eq!(manifest.programs().len(), usize::from(index == 0), "{more}");
+            assert_eq!(manifest.foreign_code(), ["exec:sh evil.sh"], "{more}");
+        }
+        assert_eq!(with("perception = \"lib:./evil.so\"").foreign_code(), ["lib:./evil.so"]);
+        for harmless in ["", "perception = \"built-in\"", "perception = \"python:mine\""] {
+            assert_eq!(with(harmless).foreign_code(), Vec::<String>::new(), "{harmless}");
+        }
+        assert_eq!(with("perception = \"python:mine\"").perceptions(), ["python:mine"]);
     }
 
     #[test]

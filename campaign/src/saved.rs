@@ -115,7 +115,7 @@ impl SavedCampaign {
     /// [`SavedError::UnknownArm`] if the campaign was not run with that controller,
     /// [`SavedError::NotTrusted`] if the folder names it and is not trusted.
     pub fn arm(&self, name: Option<&str>) -> Result<Arm, SavedError> {
-        if !self.manifest.programs().is_empty() {
+        if !self.manifest.perceptions().is_empty() {
             self.check_trust()?;
         }
         let (controllers, names) = (&self.manifest.arms, self.manifest.arm_names());

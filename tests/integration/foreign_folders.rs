@@ -17,6 +17,24 @@ read -r line
 while read -r line; do echo '{"acceleration_mps2":0.0,"state":"following"}'; done
 "#;
 
+/// A scan pattern of a LiDAR.
+const PATTERN: &str = r#"
+name = "beside"
+source = "none"
+layers-deg = [-4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 3.0]
+layer-spacing-deg = 0.5
+half-field-deg = 60.0
+azimuth-step-deg = 0.2
+beam-width-deg = 0.1
+beam-height-deg = 0.5
+rate-hz = 10.0
+range-m = 80.0
+range-reflectivity = 0.1
+range-probability = 0.9
+range-sd-m = 0.02
+range-sd-at-threshold-m = 0.06
+"#;
+
 /// The program of a user with the state folder `home`.
 fn of_user(home: &Path, folder: &Path) -> Command {
     let mut command = program();
@@ -84,6 +102,59 @@ fn commands_of_a_foreign_folder_run_only_if_it_is_trusted_and_are_printed_first(
     let edited = fs::read_to_string(&manifest).unwrap().replace("sh telling.sh", "sh  telling.sh");
     fs::write(&manifest, edited).unwrap();
     assert_eq!(code(&run(&mut user(&user_folder), &["replay", "moved", "1"])), 2);
+}
+
+/// The text of the scenario in a foreign manifest can be one that is a scenario in that folder
+/// only, or for some samples only. Its program needs the same trust.
+#[test]
+fn a_program_that_a_foreign_scenario_hides_does_not_run() {
+    let place = folder();
+    let at = |name: &str| place.path().join(name);
+    let [user_folder, foreign] = ["own", "foreign"].map(at);
+    let user = |home: &Path| of_user(home, place.path());
+    let campaign =
+        ["campaign", "low-thw-overtake", "-n", "2", "--no-gate", "--no-validity-checks", "--controller", "acc"];
+    let more = ["--set", "sensors.rear-lidar.mount-height-m=0.7", "--out", "out", "--record", "failures:0"];
+    stdout(&run(user(&user_folder).args(campaign), &more), 0);
+    let manifest = at("out/manifest.json");
+    let kept: serde_json::Value = serde_json::from_str(&fs::read_to_string(&manifest).unwrap()).unwrap();
+    let text = kept["scenarios"][0]["text"].as_str().unwrap();
+    let ran = at("ran");
+    let lidar = "rear-lidar = { mount-height-m = 0.7 }";
+    let program = format!("[sensors]\nperception = \"exec:touch {}\"\n", ran.display());
+    let plain = text.replacen("[sensors]\n", &program, 1);
+    // Nothing is in the place from which the manifest says that the scenario was read.
+    fs::write(at("out/beside.toml"), PATTERN).unwrap();
+    let beside = plain.replacen(lidar, "rear-lidar = { pattern-file = \"beside.toml\" }", 1);
+    // The typical height is too low, and the height of half the samples is not.
+    let sampled = plain.replacen(lidar, "rear-lidar = { mount-height-m = \"$hidden-m\" }", 1);
+    let sampled =
+        sampled.replacen("[parameters]", "[parameters]\nhidden-m = { uniform = { min = -0.9, max = 1.1 } } #", 1);
+    assert!(![&beside, &sampled].contains(&&plain) && sampled.contains("hidden-m = {"), "{plain}");
+    let hidden = [plain, beside, sampled];
+    fs::remove_file(at("out/journal.jsonl")).unwrap();
+    for (index, text) in hidden.iter().enumerate() {
+        assert!(text.contains("exec:touch"), "{text}");
+        let mut edited = kept.clone();
+        edited["scenarios"][0]["path"] = at("nowhere/scenario.toml").to_str().unwrap().into();
+        edited["scenarios"][0]["text"] = text.as_str().into();
+        edited["scenarios"][0]["blake3"] = blake3::hash(text.as_bytes()).to_string().into();
+        fs::write(&manifest, edited.to_string()).unwrap();
+        let commands: [&[&str]; 4] = [
+            &["replay", "out", "0"],
+            &["replay", "out", "1"],
+            &["replay", "out", "1", "--controller", "acc"],
+            &["plot", "out", "1", "-o", "figure.svg"],
+        ];
+        for words in commands {
+            let output = run(&mut user(&foreign), words);
+            assert_eq!(code(&output), 2, "{index} {words:?}: {}", stderr(&output));
+            for named in ["exec:touch", "--trust-folder"] {
+                assert!(message(&output).contains(named), "{index} {words:?}: {}", stderr(&output));
+            }
+            assert!(!ran.exists(), "{index} {words:?}");
+        }
+    }
 }
 
 #[test]
@@ -187,10 +258,10 @@ fn neither_a_link_nor_a_named_pipe_is_taken_for_a_file_of_a_folder() {
 #[test]
 fn no_input_that_is_a_named_pipe_hangs() {
     let place = folder();
-    let pipe = place.path().join("pipe.toml");
-    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let pipe = pipe.to_str().unwrap();
-    let commands: [&[&str]; 7] = [
+    let pipes = ["waits.toml", "waits.rrd", "waits.parquet", "waits.mcap"].map(|name| place.path().join(name));
+    assert!(Command::new("mkfifo").args(&pipes).status().unwrap().success());
+    let [pipe, recording, table, bag] = pipes.each_ref().map(|path| path.to_str().unwrap());
+    let commands: [&[&str]; 10] = [
         &["check", pipe],
         &["run", pipe],
         &["campaign", pipe, "-n", "2", "--no-out"],
@@ -198,11 +269,14 @@ fn no_input_that_is_a_named_pipe_hangs() {
         &["traffic", "inspect", pipe],
         &["traffic", "calibrate", pipe],
         &["run", "low-thw-overtake", "--controller", &format!("fmu:{pipe}")],
+        &["view", recording, "--no-open"],
+        &["study", "perceive", table],
+        &["study", "perceive", bag],
     ];
     for words in commands {
         let output = within_a_minute(program().args(words));
         assert_ne!(code(&output), 0, "{words:?}");
-        assert!(message(&output).contains("pipe"), "{words:?}: {}", stderr(&output));
+        assert!(message(&output).contains("it is a named pipe"), "{words:?}: {}", stderr(&output));
     }
 }
 

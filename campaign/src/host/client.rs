@@ -254,6 +254,29 @@ fn line(message: &impl serde::Serialize) -> Vec<u8> {
 /// Returns the failure of a sample whose process has ended. Its message does not depend on the
 /// samples before.
 fn failure(error: &ExecError) -> SampleFailure {
-    let message = error.end_of_isolated("the controller").unwrap_or_else(|| format!("the controller failed: {error}"));
+    let message = match error {
+        // Neither does the number of answers belong in it, nor the line, which names another
+        // question.
+        ExecError::OutOfTurn { .. } => {
+            "the controller failed: its process wrote a line that nobody had asked for".to_owned()
+        }
+        other => other.end_of_isolated("the controller").unwrap_or_else(|| format!("the controller failed: {other}")),
+    };
     SampleFailure { kind: KIND.to_owned(), message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of jobs decides how many samples a process has run before.
+    #[test]
+    fn the_message_of_a_line_too_many_does_not_depend_on_the_samples_before() {
+        let messages = [1, 7].map(|answered| {
+            let line = format!("{{\"question\":{{\"number\":{answered}}}}}");
+            failure(&ExecError::OutOfTurn { answered, line }).message
+        });
+        assert_eq!(messages[0], messages[1]);
+        assert!(messages[0].contains("a line that nobody had asked for"), "{}", messages[0]);
+    }
 }

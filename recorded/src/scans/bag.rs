@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
+use closecall_traffic::input;
 use mcap::McapError;
 use mcap::parse_record;
 use mcap::records::Record;
@@ -52,7 +53,7 @@ struct Messages {
 impl Messages {
     fn open(path: &Path) -> Result<Self, ScanFileError> {
         let origin = Origin::file(path);
-        let file = BufReader::new(File::open(path).map_err(|error| origin.error(error))?);
+        let file = BufReader::new(input::open(path).map_err(|error| origin.error(error))?);
         let (schemas, channels, counts) = Default::default();
         let reader =
             LinearReader::new_with_options(LinearReaderOptions::default().with_record_length_limit(MAX_RECORD));

@@ -2,10 +2,11 @@
 //! (Point Cloud Data) file format*), with an index that gives the time of each.
 
 use std::collections::VecDeque;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use closecall_sensors::lidar::MirrorSide;
-use closecall_traffic::Time;
+use closecall_traffic::{Time, input};
 
 use super::cloud::{Cloud, Field, Number};
 use super::error::{Origin, ScanFileError, ScanFileProblem};
@@ -74,7 +75,9 @@ impl PcdRecording {
     pub(super) fn next_scan(&mut self, options: &ScanOptions) -> Result<Option<TakenScan>, ScanFileError> {
         let Some(entry) = self.entries.pop_front() else { return Ok(None) };
         let origin = Origin::file(&entry.path);
-        let bytes = std::fs::read(&entry.path).map_err(|error| origin.error(error))?;
+        let mut bytes = Vec::new();
+        let file = input::open(&entry.path);
+        file.and_then(|mut file| file.read_to_end(&mut bytes)).map_err(|error| origin.error(error))?;
         let cloud = parse(&bytes).map_err(|problem| origin.error(problem))?;
         let points = cloud.into_points(entry.time, options);
         let mut points = points.map_err(|problem| origin.error(problem))?;

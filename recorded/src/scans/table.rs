@@ -1,13 +1,12 @@
 //! A Parquet table with one row for each point, in the layout in which a run writes its scans.
 
-use std::fs::File;
 use std::path::Path;
 
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float32Type, Float64Type, UInt16Type, UInt32Type};
 use closecall_sensors::lidar::{PointTimes, RecordedPoints};
-use closecall_traffic::Time;
+use closecall_traffic::{Time, input};
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
 use super::error::{Origin, ScanFileError, ScanFileProblem};
@@ -49,7 +48,7 @@ struct Rows {
 impl TableRecording {
     pub(super) fn open(path: &Path) -> Result<Self, ScanFileError> {
         let origin = Origin::file(path);
-        let file = File::open(path).map_err(|error| origin.error(error))?;
+        let file = input::open(path).map_err(|error| origin.error(error))?;
         let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(ParquetRecordBatchReaderBuilder::build);
         let damaged = |error: parquet::errors::ParquetError| {
             origin.error(ScanFileProblem::Points(format!("it is no table that can be read: {error}")))

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::Path;
 
+use closecall_traffic::input;
+
 use super::error::{Origin, ScanFileError, ScanFileProblem};
 
 /// A row of a table: its line, and the fields of the named columns.
@@ -22,7 +24,7 @@ pub(super) fn read_table(
 ) -> Result<Vec<TableRow>, ScanFileError> {
     let origin = Origin::file(path);
     let list = || columns[..needed].iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    let file = std::fs::File::open(path).map_err(|error| match error.kind() {
+    let file = input::open(path).map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => origin.error(ScanFileProblem::MissingFile { gives, columns: list() }),
         _ => origin.error(error),
     })?;

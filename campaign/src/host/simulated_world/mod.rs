@@ -13,7 +13,8 @@
 //! 1. an outcome in the journal is the one of its sample,
 //! 2. no verdict and no baseline comes from a part of the samples,
 //! 3. no PASS hides a sample without an outcome,
-//! 4. the last run completes the campaign to the records of an undisturbed one.
+//! 4. a check that takes too long is no defect of the simulator, and runs again on request,
+//! 5. the last run completes the campaign to the records of an undisturbed one.
 //!
 //! The idea comes from FoundationDB (Zhou et al., "FoundationDB: A Distributed Unbundled
 //! Transactional Key Value Store", SIGMOD 2021). `CLOSECALL_SCHEDULES=1000000` sets the number of
@@ -80,4 +81,12 @@ fn a_client_that_repeats_in_silence_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Silent, 0..2_000);
     let (_, violation) = violation.expect("some schedule shows it");
     assert!(matches!(violation, Violation::SilentRetry { .. }), "{violation}");
+}
+
+/// With a time-out taken for a broken check, a slow machine makes a campaign invalid.
+#[test]
+fn a_client_that_takes_time_for_a_defect_is_found_out() {
+    let (violation, _) = run(&Setup::new(), Reader::Blaming, 0..2_000);
+    let (_, violation) = violation.expect("some schedule shows it");
+    assert!(matches!(violation, Violation::TimeAsDefect { .. }), "{violation}");
 }

@@ -14,6 +14,7 @@ use rand::RngExt;
 use crate::host::client::Peer;
 use crate::host::{Answer, Question};
 use crate::record::{ArmRecord, SampleFailure};
+use crate::validity::ArmChecks;
 
 /// Time that a sample takes, without a fault.
 const ANSWER_TIME: Duration = Duration::from_millis(10);
@@ -106,9 +107,11 @@ enum Fault {
     Late,
     /// The process reports that a call hangs, and ends.
     HangingCall,
+    /// The same in a validity check: the sample has its outcome already.
+    HangingCheck,
 }
 
-const FAULTS: [Fault; 16] = [
+const FAULTS: [Fault; 17] = [
     Fault::Twice,
     Fault::EarlierAgain,
     Fault::AnotherSample,
@@ -125,6 +128,7 @@ const FAULTS: [Fault; 16] = [
     Fault::Hang,
     Fault::Late,
     Fault::HangingCall,
+    Fault::HangingCheck,
 ];
 
 impl Process {
@@ -217,6 +221,13 @@ impl Process {
                 let record = ArmRecord::new(right.record.controller.clone(), Err(failure));
                 let last = Answer { record, is_last: true, ..right };
                 self.write(at, Arrival::LastLine(serde_json::to_vec(&last).unwrap()));
+            }
+            Fault::HangingCheck => {
+                let not_checked = Some("mirror: no answer in time".to_owned());
+                let checks = Some(ArmChecks { not_checked, ..ArmChecks::default() });
+                let record = ArmRecord { checks, ..right.record };
+                let last = Answer { record, is_last: true, ..right };
+                self.write(at, line(&last));
             }
         }
     }

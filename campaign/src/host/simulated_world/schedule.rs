@@ -47,6 +47,8 @@ pub(super) enum Violation {
     OtherOutcome { sample: u64, arm: usize },
     /// A sample was run again after a crash, and its record does not say so.
     SilentRetry { arm: usize, sample: u64, crashes: u32, told: u32 },
+    /// A check that took too long counts as a defect of the simulator.
+    TimeAsDefect { sample: u64, arm: usize },
     /// A part of the samples counts as all samples.
     PartialData { has: u64 },
     /// Samples have no outcome, and the verdict is not ERROR.
@@ -67,6 +69,9 @@ impl fmt::Display for Violation {
             }
             Self::SilentRetry { arm, sample, crashes, told } => {
                 write!(f, "sample {sample} of arm {arm} has an outcome after {crashes} crashes, and tells of {told}")
+            }
+            Self::TimeAsDefect { sample, arm } => {
+                write!(f, "a check of sample {sample} in arm {arm} took too long, and counts as broken")
             }
             Self::PartialData { has } => write!(f, "{has} of {SAMPLES} records pass for all of them"),
             Self::HiddenError { errors, verdict } => write!(f, "{errors} errors, and the verdict is {verdict:?}"),
@@ -203,7 +208,8 @@ impl Setup {
         Ok((machine.faults(), verdict))
     }
 
-    /// Checks that each record of the journal has the outcome of its own sample.
+    /// Checks that each record of the journal has the outcome of its own sample, and no broken
+    /// check.
     fn check_outcomes(&self, path: &Path) -> Result<(), Violation> {
         for entry in journal::read(&path.join(JOURNAL)).unwrap() {
             let Entry::Record { record, .. } = entry.unwrap() else { break };
@@ -213,6 +219,10 @@ impl Setup {
                 let is_other = |outcome| !truth.result.as_ref().is_ok_and(|truth| truth.has_same_bits(outcome));
                 if there.result.as_ref().is_ok_and(is_other) {
                     return Err(Violation::OtherOutcome { sample, arm });
+                }
+                // No check finds anything: the only faults of checks are hanging calls.
+                if there.checks.as_ref().is_some_and(|checks| !checks.broken.is_empty()) {
+                    return Err(Violation::TimeAsDefect { sample, arm });
                 }
             }
         }
@@ -279,7 +289,8 @@ impl Setup {
         Ok(true)
     }
 
-    /// Compares the finished campaign with an undisturbed campaign, except for the notes of crashes.
+    /// Compares the finished campaign with an undisturbed campaign, except for the notes of
+    /// crashes. A check that took too long has run again.
     fn compare_with_undisturbed(&self, path: &Path, end: Option<Verdict>) -> Result<(), Violation> {
         let mut there = journal_lines(path);
         there.iter_mut().flat_map(|record| &mut record.arms).for_each(|arm| arm.flaky = None);

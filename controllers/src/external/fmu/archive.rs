@@ -5,7 +5,7 @@ use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError, TryLockError};
 use std::time::{Duration, Instant, SystemTime};
 
 use closecall_traffic::input;
@@ -146,10 +146,25 @@ pub(crate) fn unpacked_for_children(path: &Path) -> Result<PathBuf, LoadError> {
     Ok(place)
 }
 
-/// Removes what this process has unpacked for others.
+/// Time that the end of the program waits for an FMU that is being unpacked, and the interval at
+/// which it looks.
+const END_WAIT: Duration = Duration::from_millis(500);
+const END_POLL: Duration = Duration::from_millis(10);
+
+/// Removes what this process has unpacked for others. An FMU that is being unpacked keeps neither
+/// Ctrl-C nor SIGTERM waiting: the next process removes its folder as an abandoned one, see
+/// [`remove_abandoned`].
 pub(crate) fn remove_unpacked() {
-    let unpacked = std::mem::take(&mut *UNPACKED.lock().unwrap_or_else(PoisonError::into_inner));
-    drop(unpacked);
+    let begun = Instant::now();
+    let mut unpacked = loop {
+        match UNPACKED.try_lock() {
+            Ok(unpacked) => break unpacked,
+            Err(TryLockError::Poisoned(poisoned)) => break poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) if begun.elapsed() > END_WAIT => return,
+            Err(TryLockError::WouldBlock) => std::thread::sleep(END_POLL),
+        }
+    };
+    drop(std::mem::take(&mut *unpacked));
 }
 
 /// Returns the unpacked FMU: the folder that the parent process has unpacked, or a new folder.
@@ -225,11 +240,7 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     for (name, index) in &entries {
         let mut entry = archive.by_index(*index).map_err(broken)?;
         let target = folder.path.join(name);
-        if let Some(parent) = target.parent() {
-            std::fs::create_dir_all(parent).map_err(read)?;
-        }
-        let mut file = File::create(&target).map_err(read)?;
-        copy_bounded(&mut entry, &mut file, (&mut left, started)).map_err(|error| match error.kind() {
+        let file = write_file(&mut entry, &target, (&mut left, started)).map_err(|error| match error.kind() {
             // The content is compressed in another way than its header says.
             io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
                 refuse(format!("its archive is damaged in `{name}`: {error}"))
@@ -250,6 +261,19 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     Ok(Unpacked { description, binary: place.join(binary), place, folder: Some(folder) })
 }
 
+/// Writes a file of an archive, and the folders above it. `left` is the number of bytes that may
+/// still be written.
+fn write_file(from: &mut impl Read, target: &Path, (left, started): (&mut u64, Instant)) -> io::Result<File> {
+    // Empty files and folders take time, too.
+    check_time(started)?;
+    if let Some(parent) = target.parent() {
+        std::fs::create_dir_all(parent)?;
+    }
+    let mut file = File::create(target)?;
+    copy_bounded(from, &mut file, (left, started))?;
+    Ok(file)
+}
+
 /// Copies a file of an archive. `left` is the number of bytes that may still be written.
 fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mut u64, Instant)) -> io::Result<()> {
     const CHUNK_BYTES: usize = 1 << 16;
@@ -263,12 +287,18 @@ fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mu
             let message = format!("it holds more than the {} MiB that are unpacked", MOST_BYTES >> 20);
             io::Error::new(io::ErrorKind::FileTooLarge, message)
         })?;
-        if started.elapsed() > LONGEST {
-            let message = format!("it takes longer to unpack than the {} s allowed", LONGEST.as_secs());
-            return Err(io::Error::new(io::ErrorKind::TimedOut, message));
-        }
+        check_time(started)?;
         to.write_all(&chunk[..read])?;
     }
+}
+
+/// Returns an error if unpacking takes too long. It began at `started`.
+fn check_time(started: Instant) -> io::Result<()> {
+    if started.elapsed() <= LONGEST {
+        return Ok(());
+    }
+    let message = format!("it takes longer to unpack than the {} s allowed", LONGEST.as_secs());
+    Err(io::Error::new(io::ErrorKind::TimedOut, message))
 }
 
 /// Returns the name of a file in the notation of the standard: with slashes, and without `./`. Some
@@ -367,6 +397,31 @@ mod tests {
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
         copy_bounded(&mut [0; 10].as_slice(), &mut written, (&mut left, Instant::now())).unwrap();
         assert_eq!((left, written.len()), (0, 10));
+    }
+
+    #[test]
+    fn the_time_of_empty_files_is_bounded_too() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("resources/deep/empty");
+        let (mut left, long_ago) = (10, Instant::now().checked_sub(LONGEST + Duration::from_secs(1)).unwrap());
+        let error = write_file(&mut io::empty(), &target, (&mut left, long_ago)).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        assert!(error.to_string().contains("longer to unpack than the 60 s allowed"), "{error}");
+        assert!(!place.path().join("resources").exists());
+        write_file(&mut io::empty(), &target, (&mut left, Instant::now())).unwrap();
+        assert!(target.is_file());
+    }
+
+    #[test]
+    fn the_end_of_the_program_does_not_wait_for_an_fmu_that_is_being_unpacked() {
+        let unpacking = UNPACKED.lock().unwrap_or_else(PoisonError::into_inner);
+        // Another thread holds the lock, as it is held when a signal arrives.
+        std::thread::scope(|scope| {
+            scope.spawn(remove_unpacked).join().unwrap();
+        });
+        drop(unpacking);
+        remove_unpacked();
+        assert!(UNPACKED.lock().unwrap_or_else(PoisonError::into_inner).is_empty());
     }
 
     #[test]

@@ -9,14 +9,13 @@
 //! messages of the file are sent to the viewer, and the loop with them. The time panel must precede
 //! the message that makes the layout the active one: the viewer copies the layout then.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
 
 use arrow::array::{Array, AsArray, Float64Array, ListArray};
 use arrow::datatypes::Float64Type;
-use closecall_traffic::Time;
+use closecall_traffic::{Time, input};
 use rerun::blueprint::components::{LoopMode, PanelState, PlayState, TimelineName};
 use rerun::log::LogMsg;
 use rerun::sink::{GrpcSink, LogSink as _};
@@ -45,7 +44,7 @@ pub struct LoopedRecording {
 impl LoopedRecording {
     /// Reads a recording. `None` if it cannot be read, or has no critical moment.
     pub fn read(path: &Path) -> Option<Self> {
-        let messages = Decoder::decode_lazy(BufReader::new(File::open(path).ok()?));
+        let messages = Decoder::decode_lazy(BufReader::new(input::open(path).ok()?));
         let messages = messages.collect::<Result<Vec<LogMsg>, _>>().ok()?;
         let critical: Vec<Time> = messages.iter().flat_map(critical_moments).map(Time::from_s).collect();
         let span = [*critical.iter().min()? - BEFORE, *critical.iter().max()? + AFTER];

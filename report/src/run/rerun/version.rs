@@ -2,9 +2,10 @@
 //! it.
 
 use std::fmt;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+
+use closecall_traffic::input;
 
 use super::parts::{Decodable, StreamHeader};
 
@@ -51,7 +52,7 @@ impl RerunVersion {
     /// [`VersionError`] if the file cannot be read, or is no recording.
     pub fn of_recording(path: &Path) -> Result<Self, VersionError> {
         let mut start = Vec::new();
-        File::open(path)?.take(StreamHeader::ENCODED_SIZE_BYTES as u64).read_to_end(&mut start)?;
+        input::open(path)?.take(StreamHeader::ENCODED_SIZE_BYTES as u64).read_to_end(&mut start)?;
         let header = StreamHeader::from_rrd_bytes(&start)
             .map_err(|error| VersionError::Foreign { reason: error.to_string() })?;
         let [major, minor, patch, _] = header.version;

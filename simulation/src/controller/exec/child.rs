@@ -349,11 +349,15 @@ impl Child {
         }
         self.tree_looked = Instant::now();
         let process = self.process.id();
-        let descendants = processes::descendants(process);
-        if descendants.is_empty() {
+        let orphans = self.entry.as_ref().map_or_else(Vec::new, processes::orphans);
+        // A process that has no others is looked at by its peak.
+        let roots = orphans.iter().copied().chain([process]);
+        let below: Vec<u32> = roots.flat_map(processes::descendants).collect();
+        if orphans.is_empty() && below.is_empty() {
             return 0;
         }
-        descendants.into_iter().chain([process]).map(proportional_kib).sum::<u64>().div_ceil(1_024)
+        let tree = orphans.into_iter().chain(below).chain([process]);
+        tree.map(proportional_kib).sum::<u64>().div_ceil(1_024)
     }
 
     /// Returns why standard output has ended: with the process, or before it.

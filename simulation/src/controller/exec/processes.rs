@@ -164,14 +164,20 @@ impl Registry {
         self.prefix.get_or_insert_with(new_prefix)
     }
 
+    /// Returns the children of this program that are no orphans: the controllers and the guard.
+    fn kept(&self) -> BTreeSet<i32> {
+        let mut kept: BTreeSet<i32> = self.live.values().map(|pid| pid.as_raw_nonzero().get()).collect();
+        kept.extend(self.guard.iter().map(|(guard, _)| Pid::from_child(guard).as_raw_nonzero().get()));
+        kept
+    }
+
     /// Kills and reaps the orphans with this mark, or all orphans. Reaps processes that have ended
     /// by themselves.
     fn end_orphans(&mut self, mark: Option<&str>) {
         if !self.adopts {
             return;
         }
-        let mut kept: BTreeSet<i32> = self.live.values().map(|pid| pid.as_raw_nonzero().get()).collect();
-        kept.extend(self.guard.iter().map(|(guard, _)| Pid::from_child(guard).as_raw_nonzero().get()));
+        let kept = self.kept();
         for _ in 0..MAX_ROUNDS {
             let mut has_killed = false;
             for pid in own_children().into_iter().filter(|pid| !kept.contains(&pid.as_raw_nonzero().get())) {
@@ -221,7 +227,7 @@ fn kill_and_reap(pid: Pid) {
 }
 
 /// Returns the descendants of a process. Those whose parents have ended are children of this
-/// program, and not among them.
+/// program, and not among them: see [`orphans`].
 pub(super) fn descendants(process: u32) -> Vec<u32> {
     let mut tree = vec![process];
     let mut index = 0;
@@ -235,6 +241,24 @@ pub(super) fn descendants(process: u32) -> Vec<u32> {
         index += 1;
     }
     tree.split_off(1)
+}
+
+/// Returns the descendants of a controller whose parents have ended, such as a process that a
+/// controller sends into the background. There are none if this program does not adopt them: see
+/// [`adopt_orphans`]. A process that has cleared its environment is not among them.
+pub(super) fn orphans(entry: &Entry) -> Vec<u32> {
+    let registry = lock();
+    if !registry.adopts {
+        return Vec::new();
+    }
+    let kept = registry.kept();
+    drop(registry);
+    // The system gives orphans to the first thread of the program that adopts them.
+    let list = format!("/proc/self/task/{}/children", std::process::id());
+    let adopted = fs::read_to_string(list).unwrap_or_default();
+    let adopted = adopted.split_whitespace().filter_map(|id| id.parse().ok()).filter_map(Pid::from_raw);
+    let orphans = adopted.filter(|pid| !kept.contains(&pid.as_raw_nonzero().get()) && has_mark(*pid, &entry.mark));
+    orphans.filter_map(|pid| u32::try_from(pid.as_raw_nonzero().get()).ok()).collect()
 }
 
 /// Returns the children of this program, which include adopted ones.
