@@ -257,8 +257,9 @@ const show = row => {
   if (data.is_served) part(happened, `sample/${name}/${number}`, 'The sample runs again.');
   history.replaceState(null, '', `#${name}/${number}`);
   panels.filter(panel => panel.y).forEach(drawPlane);
-  // On a narrow page the sample stands below the charts.
-  if (holder.getBoundingClientRect().top > innerHeight) holder.scrollIntoView();
+  // The sample stands above the list and, on a narrow page, below the charts.
+  const { top } = holder.getBoundingClientRect();
+  if (top < 0 || top > innerHeight) { holder.scrollIntoView(); holder.focus({ preventScroll: true }); }
 };
 
 const options = (select, names, chosen) => {
