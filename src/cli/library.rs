@@ -17,7 +17,7 @@ use crate::exit_code::ExitCode;
 const FAULTS: &str = "faults";
 const MEMBERS: &str = "members";
 /// Least width of a question beside the name of its scenario (columns). In a narrower terminal the
-/// question stands below the name.
+/// question is left out.
 const LEAST_QUESTION: usize = 30;
 /// The tag of a scenario that injects a fault.
 const FAULT_TAG: &str = "fault";
@@ -86,12 +86,9 @@ fn overview(listed: &[LibraryEntry], members: &[&str]) {
     let width = plain.iter().map(|scenario| scenario.name.len()).max().unwrap_or(0);
     let has_room = output_columns().is_none_or(|columns| columns >= width + LEAST_QUESTION);
     for scenario in &plain {
-        if has_room {
-            outln!("{}", cut(&format!("{:width$}  {}", scenario.name, scenario.question)));
-        } else {
-            outln!("{}", cut(scenario.name));
-            print_text(format_args!("  {}\n", scenario.question));
-        }
+        let question = scenario.question.replace("the margin increase system", "the MIS");
+        let line = if has_room { format!("{:width$}  {question}", scenario.name) } else { scenario.name.to_owned() };
+        outln!("{}", cut(&line));
     }
     print_text(format_args!(
         "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.\n",
