@@ -66,12 +66,15 @@ impl fmt::Display for FlakyText<'_> {
     }
 }
 
-/// Largest number of reasons below the sentence of the verdict: with the paths of the written files, they fit on a screen.
+/// Largest number of reasons that are all below the sentence of the verdict: they fit on a screen.
+const MOST_TOGETHER: usize = 12;
+/// Largest number of reasons below the sentence if there are more: with the paths of the written files, they fit on a
+/// screen even if each takes a few lines.
 const MOST_BELOW: usize = 5;
 
 /// The verdict in one sentence, with its reasons in plain words: below it the gates that are not met, the worst first.
-/// Gates that are met and remarks on single scenarios come before it, so that the last screen of the output has the
-/// verdict.
+/// If there are many reasons, gates that are met and remarks on single scenarios come before the sentence, so that the
+/// last screen of the output has the verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictText<'a> {
     /// The verdict.
@@ -84,10 +87,12 @@ impl fmt::Display for VerdictText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sentence = sentence(self.judged, self.scenarios);
         let Reasons { weighty, settled } = Reasons::below(self.judged, &sentence);
-        let (below, more) = weighty.split_at(weighty.len().min(MOST_BELOW));
-        if !settled.is_empty() || !more.is_empty() {
-            writeln!(f, "Gates and remarks that the verdict does not repeat:")?;
+        if weighty.len() + settled.len() <= MOST_TOGETHER {
+            writeln!(f, "{sentence}")?;
+            return weighty.iter().chain(&settled).try_for_each(|reason| writeln!(f, "  {reason}"));
         }
+        let (below, more) = weighty.split_at(weighty.len().min(MOST_BELOW));
+        writeln!(f, "Gates and remarks that the verdict does not repeat:")?;
         settled.iter().chain(more).try_for_each(|reason| writeln!(f, "  {reason}"))?;
         writeln!(f, "{sentence}")?;
         below.iter().try_for_each(|reason| writeln!(f, "  {reason}"))?;
@@ -288,13 +293,13 @@ mod tests {
         }
         assert_eq!(verdict[6], "  and 3 more above the verdict");
         assert!(lines[lines.len() - 8].starts_with("  NOT MET: s0: "), "{lines:?}");
-        // A campaign with nothing to fold has no heading.
-        let alone = Judgement {
-            reasons: Vec::new(),
-            background: Vec::new(),
-            gates: vec![gate(0, 1.0, Answer::Missed)],
-            ..judged
-        };
-        assert_eq!(VerdictText { judged: &alone, scenarios: 1 }.to_string().lines().count(), 2);
+        // A campaign with few reasons has them below its verdict, the met ones last.
+        let gates = vec![gate(1, 0.0, Answer::Met), gate(0, 1.0, Answer::Missed)];
+        let few = Judgement { reasons: Vec::new(), background: Vec::new(), gates, ..judged };
+        let text = VerdictText { judged: &few, scenarios: 2 }.to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("FAIL: 1 of 2 scenarios misses a gate: s0"), "{lines:?}");
+        assert!(lines[1].starts_with("  NOT MET: s0: ") && lines[2].starts_with("  met: s1: "), "{lines:?}");
+        assert_eq!(lines.len(), 3);
     }
 }

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The page, the summary and the terminal have the same words, and the same order of the gates. Gates that are met and
-//! remarks on single scenarios are folded on the page and in the summary. On the terminal they are above the verdict.
+//! remarks on single scenarios are folded on the page and in the summary. On the terminal, many are above it.
 
 use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
