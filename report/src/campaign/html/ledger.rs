@@ -21,7 +21,7 @@ use closecall_traffic::statistics::format::percent;
 use closecall_traffic::words::counted;
 
 /// Number of rows of the table on the screen if there are many scenarios. The others are folded. Paper has all rows.
-const ROWS: usize = 12;
+const ROWS: usize = 6;
 
 /// Returns the counts of the campaign.
 pub(super) fn counts(findings: &Findings<'_>) -> io::Result<Markup> {
