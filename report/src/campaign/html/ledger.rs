@@ -36,7 +36,7 @@ pub(super) fn counts(findings: &Findings<'_>) -> io::Result<Markup> {
         h2 { "Counts of each scenario" }
         div.screen {
             (compact(first))
-            details { summary { (others.len()) " more scenarios" } (compact(others)) }
+            details { summary { (counted(others.len(), "more scenario")) } (compact(others)) }
         }
         div.paper.counts { (compact(&rows)) }
         p.note { (RATES_NOTE) }
