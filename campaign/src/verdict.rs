@@ -134,6 +134,9 @@ pub struct Judgement {
     pub decision: Decision,
     /// Every reason for it, in sentences. The reasons that decide come first, then remarks.
     pub reasons: Vec<String>,
+    /// The reasons that decide nothing and are about one scenario each: what happened as expected, what extrapolates.
+    /// There may be one for each scenario, so that a report folds them.
+    pub background: Vec<String>,
     /// Every gate and every check of a requirement, with its answer.
     pub gates: Vec<GateResult>,
     /// How each requirement fares in each scenario that names it.
@@ -276,7 +279,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         gates.iter().any(|gate| gate.scenario == requirement.scenario && gate.is_of(&requirement.mark))
     };
     for requirement in requirements.iter().filter(|requirement| !has_criteria(requirement)) {
-        findings.note(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));
+        findings.background(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));
     }
     let is_judged = !probabilities.is_empty() || is_judged(&gates);
     let decision = if judge.is_measurement() {
@@ -295,8 +298,9 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     };
     judge_extrapolation(judge, &mut findings);
     let coverage = judge.coverage().map(|(name, results)| (name.to_owned(), results)).collect();
+    let background = findings.background.clone();
     let reasons = findings.into_reasons(decision);
-    Judgement { decision, reasons, gates, requirements, expectations, probabilities, coverage, flaky }
+    Judgement { decision, reasons, background, gates, requirements, expectations, probabilities, coverage, flaky }
 }
 
 /// Returns the subjects of the gates that somebody set and that no scenario decides: there is no
@@ -382,7 +386,7 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
     let expectations = judge.expectations();
     for expectation in &expectations {
         if expectation.is_met() {
-            findings.note(format!("happened as expected: {expectation}"));
+            findings.background(format!("happened as expected: {expectation}"));
         } else if expectation.samples > 0 {
             findings.add(Decision::Invalid, format!("what the scenario is about did not happen: {expectation}"));
         }
@@ -399,7 +403,7 @@ fn judge_attribution<'a>(summary: &'a Summary, findings: &mut Findings) -> Vec<&
             findings.add(Decision::Fail, sentence);
             unattributed.push(name.as_str());
         } else {
-            findings.note(sentence);
+            findings.background(sentence);
         }
     }
     unattributed
@@ -409,7 +413,7 @@ fn judge_attribution<'a>(summary: &'a Summary, findings: &mut Findings) -> Vec<&
 /// assumptions.
 fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
     for (name, parameters) in judge.extrapolations() {
-        findings.note(format!("{name}: extrapolates beyond recorded traffic: {}", parameters.join("; ")));
+        findings.background(format!("{name}: extrapolates beyond recorded traffic: {}", parameters.join("; ")));
     }
 }
 
@@ -432,7 +436,7 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
             );
             findings.add(Decision::NotJudged, reason);
         } else {
-            findings.note(sentence);
+            findings.background(sentence);
         }
     }
 }
@@ -462,7 +466,7 @@ fn judge_samples(summary: &Summary, judge: &Judge, findings: &mut Findings) {
         }
         let repeated = judge.repeated(name);
         if repeated > 0 {
-            findings.note(format!(
+            findings.background(format!(
                 "{name}: {} have the parameters or the outcome of an earlier one and do not count",
                 samples(repeated)
             ));
@@ -483,7 +487,7 @@ fn judge_probabilities(summary: &Summary, judge: &Judge, findings: &mut Findings
         let finding = spec.gate.judge(counts, specs.len(), summary.inference);
         let line = finding.line(name, counts, &spec.source);
         match finding.answer {
-            Answer::Below => findings.note(line),
+            Answer::Below => findings.background(line),
             Answer::Above => findings.add(Decision::Fail, line),
             Answer::Open => findings.add(Decision::Inconclusive, line),
         }
@@ -503,11 +507,19 @@ struct Reason {
 #[derive(Default)]
 struct Findings {
     reasons: Vec<Reason>,
+    /// The texts of the remarks on one scenario each.
+    background: Vec<String>,
 }
 
 impl Findings {
     fn note(&mut self, remark: String) {
         self.reasons.push(Reason { decision: None, text: remark });
+    }
+
+    /// Notes a remark on one scenario, which a report may fold.
+    fn background(&mut self, remark: String) {
+        self.background.push(remark.clone());
+        self.note(remark);
     }
 
     fn add(&mut self, decision: Decision, reason: String) {

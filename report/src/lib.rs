@@ -23,7 +23,7 @@ mod escape;
 pub mod exchange;
 /// The parts of a page of HTML: the document, tables, and a legend.
 pub mod page {
-    pub use crate::campaign::html::page::{document, number, number_heads, table, text_heads};
+    pub use crate::campaign::html::page::{document, head, number, number_heads, table, text_heads};
 }
 pub mod heartbeat;
 pub mod json;

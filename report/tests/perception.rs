@@ -128,6 +128,9 @@ fn true_tracks_are_refused_and_the_files_of_two_configurations_are_written() {
     assert_eq!(paths.len(), 5);
     let page = std::fs::read_to_string(&paths[0]).unwrap();
     assert!(page.contains("<svg") && page.contains("against") && !page.contains("NaN") && !page.contains("inf"));
+    // The card of all pages, and lines of the legend that a dark page draws as the curves.
+    assert!(page.contains("<main><header><div><h1>Sensors: "), "{page}");
+    assert!(page.contains(".swatch { filter: invert(1)") && page.contains("<svg class=\"swatch\""));
     assert_eq!(studies.json().as_array().unwrap().len(), 2);
 }
 

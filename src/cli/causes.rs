@@ -9,6 +9,7 @@ use closecall_campaign::saved::SavedCampaign;
 use closecall_recorded::filters::smooth;
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
+use closecall_report::study::write_map;
 use closecall_scenarios::causal::LETTERS;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_studies::CausesError;
@@ -19,7 +20,7 @@ use closecall_studies::exposure::{
     Counted, EventRule, ExposureText, StatedRange, exposure as compute_exposure, observe, shares_of,
 };
 use closecall_studies::failures::explain_failures;
-use closecall_studies::map::{MapGrid, MapText, map as compute_map, write_map};
+use closecall_studies::map::{MapGrid, MapText, map as compute_map};
 use closecall_studies::minimize::{MinimizedText, NearestSearch, minimize_sample, output_files, write_files};
 use serde_json::json;
 

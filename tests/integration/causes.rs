@@ -268,6 +268,9 @@ fn the_map_agrees_with_theory_or_says_why() {
     }
     let page = std::fs::read_to_string(dir.join("map.html")).unwrap();
     assert!(page.contains("paper: always") && page.contains("paper: never"));
+    // The style of all pages: the card with the title, and the frames of the pictures.
+    assert!(page.contains("<main><header><div><h1>Margin that mis reaches</h1>"), "{page}");
+    assert!(page.contains("prefers-color-scheme: dark") && page.matches("<figure class=\"broad\"").count() == 2);
     assert_eq!(std::fs::read_to_string(dir.join("map.csv")).unwrap().lines().count(), 17);
     let refused = closecall(["study", "map", "--controller", "acc"]);
     assert_eq!(code(&refused), 2);

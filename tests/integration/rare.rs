@@ -48,8 +48,7 @@ fn two_independent_methods_agree_on_the_headline() {
         let value = json(&closecall(words.split_whitespace()), 0);
         [0, 1].map(|end| value["scenarios"][0]["estimates"][0]["interval_95"][end].as_f64().unwrap())
     };
-    let ([low, high], [other_low, other_high]) =
-        (interval("importance"), interval("subset"));
+    let ([low, high], [other_low, other_high]) = (interval("importance"), interval("subset"));
     assert!(low <= other_high && other_low <= high, "{low} to {high}, and {other_low} to {other_high}");
 }
 

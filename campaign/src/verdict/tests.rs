@@ -56,3 +56,14 @@ fn a_gate_that_fails_decides_before_a_system_that_is_not_available() {
     assert_eq!(Decision::first_of(&[Decision::Overridden, Decision::Fail]), Some(Decision::Fail));
     assert_eq!(Decision::first_of(&[Decision::Overridden]), Some(Decision::Overridden));
 }
+
+#[test]
+fn a_remark_on_one_scenario_is_a_reason_that_a_report_may_fold() {
+    let mut findings = Findings::default();
+    findings.note("the validity of the simulator was not checked".to_owned());
+    findings.background("happened as expected: a".to_owned());
+    findings.add(Decision::Fail, "a gate".to_owned());
+    assert_eq!(findings.background, ["happened as expected: a"]);
+    assert_eq!(findings.decisions(), [Decision::Fail]);
+    assert_eq!(findings.into_reasons(Decision::Fail).len(), 3);
+}

@@ -45,11 +45,30 @@ pub struct Findings<'a> {
 
 /// Largest number of pictures in a report.
 const STILLS: usize = 3;
+/// Largest number of scenarios that a title names.
+const TITLED: usize = 3;
+/// Largest number of scenarios up to which the first screen has each of them.
+const FEW: usize = 6;
 
 impl<'a> Findings<'a> {
-    /// Returns the names of the scenarios, as a title.
+    /// Returns the names of the scenarios, as a list.
     pub(super) fn scenario_names(&self) -> String {
         self.files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Returns the scenarios as a title: their names, or their number if they are more than a few.
+    pub(super) fn scenarios_title(&self) -> String {
+        if self.names_each() { self.scenario_names() } else { format!("{} scenarios", self.files.len()) }
+    }
+
+    /// Returns true if a title names each scenario.
+    pub(super) fn names_each(&self) -> bool {
+        self.files.len() <= TITLED
+    }
+
+    /// Returns true if there are more scenarios than the first screen has room for.
+    pub(super) fn has_many(&self) -> bool {
+        self.overview.scenarios.len() > FEW
     }
 
     /// Returns the recording of a sample, in any arm. If arms have recordings of their own, the

@@ -10,7 +10,7 @@ use super::origins::Origins;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use super::recordings::card_beside;
 use super::text::{goals, imposed, not_prevented};
-use super::words::{reasons_below, sentence};
+use super::words::{Reasons, sentence};
 use crate::escape::{in_markdown, markdown_code};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
@@ -21,6 +21,8 @@ use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::shown::shown;
 use closecall_traffic::statistics::format::percent;
 
+/// Largest number of reasons below the sentence of the verdict. The others are folded.
+const SHOWN: usize = 12;
 /// Largest number of samples that are listed for each scenario.
 const LISTED: usize = 5;
 
@@ -37,7 +39,9 @@ pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteE
 pub fn markdown(findings: &Findings<'_>) -> String {
     let sentence = sentence(findings.judged, findings.files.len());
     let mut text = format!("## Closecall: {}\n\n", in_markdown(&sentence));
-    for reason in &reasons_below(findings.judged, &sentence) {
+    let Reasons { weighty, settled } = Reasons::below(findings.judged, &sentence);
+    let (shown, more) = weighty.split_at(weighty.len().min(SHOWN));
+    for reason in shown {
         text.push_str(&format!("- {}\n", in_markdown(reason)));
     }
     for (still, recording) in findings.worst_stills() {
@@ -50,6 +54,16 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     }
     if let Some(origins) = findings.folder.and_then(Origins::of) {
         text.push_str(&format!("- {}\n", in_markdown(&origins.choice_sentence())));
+    }
+    if !settled.is_empty() || !more.is_empty() {
+        let undecided = if more.is_empty() { String::new() } else { format!("{} more reasons, ", more.len()) };
+        text.push_str(&format!(
+            "\n<details><summary>{undecided}gates that are met, and remarks on single scenarios</summary>\n\n"
+        ));
+        for reason in more.iter().chain(&settled) {
+            text.push_str(&format!("- {}\n", in_markdown(reason)));
+        }
+        text.push_str("\n</details>\n");
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));

@@ -13,7 +13,7 @@ use closecall_traffic::words::counted;
 
 use super::overview::{ErrorGroup, Overview};
 use super::pareto::ParetoText;
-use super::words::{reasons_below, sentence};
+use super::words::{Reasons, sentence};
 
 /// Width of the names of the arms in the output, at least.
 const NAME_WIDTH: usize = 5;
@@ -66,7 +66,15 @@ impl fmt::Display for FlakyText<'_> {
     }
 }
 
-/// The verdict in one sentence, with its reasons in plain words: first the gates that are not met.
+/// Largest number of reasons that are all below the sentence of the verdict: they fit on a screen.
+const MOST_TOGETHER: usize = 12;
+/// Largest number of reasons below the sentence if there are more: with the paths of the written files, they fit on a
+/// screen even if each takes a few lines.
+const MOST_BELOW: usize = 5;
+
+/// The verdict in one sentence, with its reasons in plain words: below it the gates that are not met, the worst first.
+/// If there are many reasons, gates that are met and remarks on single scenarios come before the sentence, so that the
+/// last screen of the output has the verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictText<'a> {
     /// The verdict.
@@ -78,8 +86,20 @@ pub struct VerdictText<'a> {
 impl fmt::Display for VerdictText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sentence = sentence(self.judged, self.scenarios);
+        let Reasons { weighty, settled } = Reasons::below(self.judged, &sentence);
+        if weighty.len() + settled.len() <= MOST_TOGETHER {
+            writeln!(f, "{sentence}")?;
+            return weighty.iter().chain(&settled).try_for_each(|reason| writeln!(f, "  {reason}"));
+        }
+        let (below, more) = weighty.split_at(weighty.len().min(MOST_BELOW));
+        writeln!(f, "Gates and remarks that the verdict does not repeat:")?;
+        settled.iter().chain(more).try_for_each(|reason| writeln!(f, "  {reason}"))?;
         writeln!(f, "{sentence}")?;
-        reasons_below(self.judged, &sentence).iter().try_for_each(|reason| writeln!(f, "  {reason}"))
+        below.iter().try_for_each(|reason| writeln!(f, "  {reason}"))?;
+        match more.len() {
+            0 => Ok(()),
+            count => writeln!(f, "  and {count} more above the verdict"),
+        }
     }
 }
 
@@ -231,4 +251,58 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
     }
     writeln!(f)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_campaign::gate::{Answer, Evaluation, GateResult, GateSource};
+    use closecall_campaign::verdict::Decision;
+
+    use super::*;
+
+    fn gate(index: usize, value: f64, answer: Answer) -> GateResult {
+        let samples = 30;
+        GateResult {
+            scenario: format!("s{index}"),
+            expression: "count(ego_collided) <= 0".parse().unwrap(),
+            source: GateSource::CommandLine,
+            evaluation: Evaluation { value: Some(value), interval_95: None, samples, hits: 0, answer, needed: None },
+        }
+    }
+
+    #[test]
+    fn the_last_lines_are_the_verdict_and_its_worst_gates_whatever_happened_as_expected() {
+        let missed = (0..8).map(|index| gate(index, 1.0 + index as f64, Answer::Missed));
+        let met = (8..104).map(|index| gate(index, 0.0, Answer::Met));
+        let background: Vec<String> = (0..104).map(|index| format!("happened as expected: s{index}: x")).collect();
+        let judged = Judgement {
+            decision: Decision::Fail,
+            reasons: background.clone(),
+            background,
+            gates: missed.chain(met).collect(),
+            requirements: Vec::new(),
+            expectations: Vec::new(),
+            probabilities: Vec::new(),
+            coverage: Vec::new(),
+            flaky: None,
+        };
+        let text = VerdictText { judged: &judged, scenarios: 104 }.to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 1 + 104 + 96 + 8 + 1 + 1);
+        let verdict = &lines[lines.len() - 7..];
+        assert!(verdict[0].starts_with("FAIL: 8 of 104 scenarios miss a gate: s7, "), "{verdict:?}");
+        for (line, scenario) in verdict[1..6].iter().zip(["s7", "s6", "s5", "s4", "s3"]) {
+            assert!(line.starts_with(&format!("  NOT MET: {scenario}: number of samples")), "{verdict:?}");
+        }
+        assert_eq!(verdict[6], "  and 3 more above the verdict");
+        assert!(lines[lines.len() - 8].starts_with("  NOT MET: s0: "), "{lines:?}");
+        // A campaign with few reasons has them below its verdict, the met ones last.
+        let gates = vec![gate(1, 0.0, Answer::Met), gate(0, 1.0, Answer::Missed)];
+        let few = Judgement { reasons: Vec::new(), background: Vec::new(), gates, ..judged };
+        let text = VerdictText { judged: &few, scenarios: 2 }.to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("FAIL: 1 of 2 scenarios misses a gate: s0"), "{lines:?}");
+        assert!(lines[1].starts_with("  NOT MET: s0: ") && lines[2].starts_with("  met: s1: "), "{lines:?}");
+        assert_eq!(lines.len(), 3);
+    }
 }

@@ -6,7 +6,8 @@
 //!    NOT MET: cut-in-into-margin: MIS-6: …
 //! ```
 //!
-//! The page, the summary and the terminal have the same words in the same order.
+//! The page, the summary and the terminal have the same words, and the same order of the gates. Gates that are met and
+//! remarks on single scenarios are folded on the page and in the summary. On the terminal, many are above it.
 
 use closecall_campaign::gate::{Answer, Certainty, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
@@ -16,12 +17,18 @@ use closecall_traffic::words::counted;
 
 use crate::units::unit_of;
 
+/// Largest number of scenarios that a sentence names.
+const NAMED: usize = 4;
+
 /// Returns the verdict in one sentence. `scenarios` is the number of scenarios of the campaign.
 pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     let word = judged.word();
     let because = |decided: Standing, verb: &str| {
         let names = scenarios_of(judged, decided);
-        let listed: Vec<String> = names.iter().map(|(name, marks)| named(name, marks)).collect();
+        let mut listed: Vec<String> = names.iter().take(NAMED).map(|(name, marks)| named(name, marks)).collect();
+        if names.len() > NAMED {
+            listed.push(format!("and {} more", names.len() - NAMED));
+        }
         let subject = if names.iter().all(|(_, marks)| !marks.is_empty()) { "a requirement" } else { "a gate" };
         (!listed.is_empty()).then(|| match names.len() {
             1 if scenarios == 1 => format!("{word}: the scenario {} {subject}: {}", singular(verb), listed.join(", ")),
@@ -278,11 +285,25 @@ pub(crate) fn is_said(judged: &Judgement, sentence: &str, reason: &str) -> bool 
     sentence == reason || told == Some(reason)
 }
 
-/// Returns the reasons that stand below the sentence of the verdict: all but the one that it says.
-pub(crate) fn reasons_below(judged: &Judgement, sentence: &str) -> Vec<String> {
-    let mut reasons = reasons(judged);
-    reasons.retain(|reason| !is_said(judged, sentence, reason));
-    reasons
+/// The reasons of a verdict without the one that its sentence says.
+#[derive(Debug)]
+pub(crate) struct Reasons {
+    /// Gates that are not met or open, the worst first, and remarks on the whole campaign.
+    pub(crate) weighty: Vec<String>,
+    /// Gates that are met or not checked, and remarks on one scenario each.
+    pub(crate) settled: Vec<String>,
+}
+
+impl Reasons {
+    /// Returns the reasons below the sentence of a verdict.
+    pub(crate) fn below(judged: &Judgement, sentence: &str) -> Self {
+        let is_met = |gate: &&GateResult| gate.standing() <= Standing::NotChecked;
+        let met: Vec<String> = judged.gates.iter().filter(is_met).map(gate_line).collect();
+        let is_settled = |reason: &String| judged.background.contains(reason) || met.contains(reason);
+        let below = reasons(judged).into_iter().filter(|reason| !is_said(judged, sentence, reason));
+        let (settled, weighty) = below.partition(is_settled);
+        Self { weighty, settled }
+    }
 }
 
 #[cfg(test)]
@@ -314,6 +335,7 @@ mod tests {
         Judgement {
             decision,
             reasons: gates.iter().map(ToString::to_string).chain(["a note".to_owned()]).collect(),
+            background: Vec::new(),
             gates,
             requirements: Vec::new(),
             expectations: Vec::new(),
@@ -355,12 +377,39 @@ mod tests {
         let headline = sentence(&judgement, 1);
         assert_eq!(headline, "ERROR: 2 samples ended in an error");
         assert_eq!(reasons(&judgement)[..2], told);
-        let below = reasons_below(&judgement, &headline);
+        let below = Reasons::below(&judgement, &headline).weighty;
         assert_eq!((below[0].as_str(), below[1].as_str()), (told[1], "a note"));
         assert!(below[2].starts_with("open: a: "), "{below:?}");
         judgement.decision = Decision::Overridden;
         judgement.reasons = vec!["OVERRIDDEN: a: a setting".to_owned()];
-        assert_eq!(reasons_below(&judgement, &sentence(&judgement, 1)).len(), 1, "only the gate is left");
+        let below = Reasons::below(&judgement, &sentence(&judgement, 1));
+        assert_eq!((below.weighty.len(), below.settled.len()), (1, 0), "only the gate is left");
+    }
+
+    #[test]
+    fn what_decides_nothing_about_single_scenarios_is_apart_from_what_a_reader_has_to_know() {
+        let gates = vec![
+            gate("a", "upper(induced) <= 0.03", Some("MIS-2"), 0.02, Answer::Met),
+            gate("b", "count(ego_collided) <= 0", Some("MIS-3"), 2.0, Answer::Missed),
+        ];
+        let mut judgement = judged(Decision::Fail, gates);
+        let expected = "happened as expected: a: lead_braked in 30 of 30 samples".to_owned();
+        judgement.reasons.push(expected.clone());
+        judgement.background.push(expected.clone());
+        let Reasons { weighty, settled } = Reasons::below(&judgement, &sentence(&judgement, 2));
+        assert!(weighty[0].starts_with("NOT MET: b: MIS-3: ") && weighty[1..] == ["a note"], "{weighty:?}");
+        assert!(settled[0] == expected && settled[1].starts_with("met: a: MIS-2: "), "{settled:?}");
+        assert_eq!(settled.len(), 2);
+    }
+
+    #[test]
+    fn the_sentence_of_many_scenarios_names_a_few() {
+        let missed = |index: usize| gate(&format!("s{index}"), "count(ego_collided) <= 0", None, 2.0, Answer::Missed);
+        let judgement = judged(Decision::Fail, (0..60).map(missed).collect());
+        let text = sentence(&judgement, 104);
+        assert_eq!(text, "FAIL: 60 of 104 scenarios miss a gate: s0, s1, s2, s3, and 56 more");
+        let four = judged(Decision::Fail, (0..4).map(missed).collect());
+        assert!(sentence(&four, 6).ends_with(": s0, s1, s2, s3"), "{}", sentence(&four, 6));
     }
 
     #[test]

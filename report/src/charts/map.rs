@@ -6,7 +6,7 @@ use maud::Markup;
 use plotters::prelude::*;
 
 use super::distribution::parameter_axis;
-use super::style::{COLLISIONS, Drawn, LARGE_PX, Plot, axes, fate_colour, inline};
+use super::style::{COLLISIONS, Drawn, MAP_PX, Plot, WIDEST_MAP_PX, axes, fate_colour, scaled};
 use crate::campaign::overview::{Axis, CELLS, Fate, PairBins, Point, ScenarioOverview};
 use crate::units::labelled;
 
@@ -22,9 +22,9 @@ const SPREAD: f64 = 0.6;
 /// collision in the arm under test. Points are samples.
 pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::Result<Markup> {
     let [across, up] = pair.axes.map(|index| &scenario.axes[index]);
-    inline(LARGE_PX, |canvas| {
+    scaled(MAP_PX, WIDEST_MAP_PX, |canvas| {
         let [x_name, y_name] = [across, up].map(|axis| labelled(axis.name()));
-        let (x, y) = (parameter_axis(across, &x_name, 8), parameter_axis(up, &y_name, 8));
+        let (x, y) = (parameter_axis(across, &x_name, 5), parameter_axis(up, &y_name, 8));
         let mut plot = axes(canvas, None, &x, &y)?;
         draw_cells(&mut plot, pair, across, up)?;
         // Fates are ordered by their weight: the gravest is drawn last.

@@ -26,8 +26,15 @@ const OTHER: RGBColor = RGBColor(0x8d, 0x99, 0xa6);
 const FAINT: f64 = 0.35;
 /// Radius of the points (px).
 const POINT_PX: i32 = 4;
-/// Distance of a label from its point (px).
-const LABEL_PX: (i32, i32) = (7, -14);
+/// Distances of a label from its point, sideways and up or down (px).
+const ASIDE_PX: i32 = 7;
+const ABOVE_PX: i32 = 14;
+const BELOW_PX: i32 = 3;
+/// Width of a letter and height of a line of a label (px).
+const LETTER_PX: i32 = 7;
+const LINE_PX: i32 = 14;
+/// Lines above and below a point in which its label may stand.
+const LINES: i32 = 3;
 /// Free space at the ends of an axis, as a share of its range.
 const MARGIN: f64 = 0.06;
 
@@ -56,14 +63,48 @@ pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) ->
             ])?;
             let colour = if point.is_marked { MARKED } else { OTHER };
             plot.draw_series([Circle::new((x, y), POINT_PX, colour.filled())])?;
-            if point.is_marked {
-                let text = Text::new(point.label.clone(), LABEL_PX, label_text(false));
-                plot.draw_series([EmptyElement::at((x, y)) + text])?;
+        }
+        let marked: Vec<&ScatterPoint> = points.iter().filter(|point| point.is_marked).collect();
+        let at = |point: &&ScatterPoint| plot.backend_coord(&(point.at[0], point.at[1]));
+        let centres: Vec<(i32, i32)> = marked.iter().map(at).collect();
+        let lengths: Vec<usize> = marked.iter().map(|point| point.label.chars().count()).collect();
+        for (point, place) in marked.iter().zip(places(&centres, &lengths)) {
+            // The table beside the chart also has a point whose label has no room.
+            if let Some(place) = place {
+                let text = Text::new(point.label.clone(), place, label_text(false));
+                plot.draw_series([EmptyElement::at((point.at[0], point.at[1])) + text])?;
             }
         }
         Ok(())
     });
     drawn.map_err(|error| io::Error::other(error.to_string()))
+}
+
+/// Returns the offset of the label of each point from its centre (px), by the centres (px) and the numbers of letters.
+/// No label covers another label, a point, or the edge of the chart. A label without room has none.
+fn places(centres: &[(i32, i32)], lengths: &[usize]) -> Vec<Option<(i32, i32)>> {
+    let overlap = |[left, top, right, bottom]: [i32; 4], other: [i32; 4]| {
+        left < other[2] && other[0] < right && top < other[3] && other[1] < bottom
+    };
+    let point = |&(x, y): &(i32, i32)| [x - POINT_PX, y - POINT_PX, x + POINT_PX, y + POINT_PX];
+    let mut occupied: Vec<[i32; 4]> = centres.iter().map(point).collect();
+    let mut placed = Vec::with_capacity(centres.len());
+    for (&(x, y), &letters) in centres.iter().zip(lengths) {
+        let width = LETTER_PX * i32::try_from(letters).unwrap_or(i32::MAX / LETTER_PX);
+        let area = |(across, up): (i32, i32)| [x + across, y + up, x + across + width, y + up + LINE_PX];
+        let tops = (0..LINES).flat_map(|line| [-ABOVE_PX - line * LINE_PX, BELOW_PX + line * LINE_PX]);
+        let mut offsets = tops.flat_map(|top| [(ASIDE_PX, top), (-ASIDE_PX - width, top)]);
+        let is_free = |offset: &(i32, i32)| {
+            let [left, top, right, bottom] = area(*offset);
+            let is_inside =
+                left >= 0 && top >= 0 && right <= FILE_PX.0.cast_signed() && bottom <= FILE_PX.1.cast_signed();
+            is_inside && !occupied.iter().any(|other| overlap([left, top, right, bottom], *other))
+        };
+        let offset = offsets.find(is_free);
+        occupied.extend(offset.map(area));
+        placed.push(offset);
+    }
+    placed
 }
 
 /// Returns the range of an axis that holds all intervals.
@@ -75,4 +116,39 @@ fn range(points: &[ScatterPoint], axis: usize) -> Range<f64> {
     }
     let margin = MARGIN * (high - low);
     low - margin..high + margin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The area of a label (px).
+    fn area((x, y): (i32, i32), (across, up): (i32, i32), letters: i32) -> [i32; 4] {
+        [x + across, y + up, x + across + LETTER_PX * letters, y + up + LINE_PX]
+    }
+
+    #[test]
+    fn labels_of_points_close_to_each_other_cover_no_label_and_no_point() {
+        // Four combinations of a frontier, two of them almost at one place, and one at the right edge.
+        let centres = [(400, 200), (403, 204), (420, 210), (840, 300)];
+        let offsets = places(&centres, &[23; 4]);
+        let areas: Vec<[i32; 4]> =
+            centres.iter().zip(&offsets).map(|(centre, offset)| area(*centre, offset.unwrap(), 23)).collect();
+        for (index, one) in areas.iter().enumerate() {
+            assert!(one[0] >= 0 && one[2] <= 860, "{one:?}");
+            for other in &areas[index + 1..] {
+                let is_apart = one[2] <= other[0] || other[2] <= one[0] || one[3] <= other[1] || other[3] <= one[1];
+                assert!(is_apart, "{one:?} and {other:?}");
+            }
+            assert!(centres.iter().all(|(x, y)| *x < one[0] || *x > one[2] || *y < one[1] || *y > one[3]), "{one:?}");
+        }
+    }
+
+    #[test]
+    fn labels_without_room_are_left_out() {
+        let offsets = places(&[(400, 200); 40], &[23; 40]);
+        let shown = offsets.iter().flatten().count();
+        assert!((2..40).contains(&shown), "{shown}");
+        assert_eq!(offsets[0], Some((ASIDE_PX, -ABOVE_PX)));
+    }
 }

@@ -25,8 +25,10 @@ pub(crate) type Drawn<T = ()> = Result<T, DrawingAreaErrorKind<io::Error>>;
 
 /// Size of a chart that stands beside others (px).
 pub(super) const SMALL_PX: (u32, u32) = (420, 220);
-/// Size of a chart that stands alone on a page (px).
-pub(super) const LARGE_PX: (u32, u32) = (760, 460);
+/// Size of a map (px): its text is legible on a page of 390 px.
+pub(super) const MAP_PX: (u32, u32) = (400, 360);
+/// Largest width of a map on a page (px).
+pub(super) const WIDEST_MAP_PX: u32 = 620;
 /// Size of a chart in a file of its own (px).
 pub(crate) const FILE_PX: (u32, u32) = (860, 520);
 
@@ -195,6 +197,15 @@ pub(super) fn inline(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Dra
     sized(size_px, &format!("style=\"max-width:{}px\"", size_px.0), paint)
 }
 
+/// Returns a chart that grows and shrinks with the page, and is at most this wide (px).
+pub(super) fn scaled(
+    size_px: (u32, u32),
+    widest_px: u32,
+    paint: impl FnOnce(&Canvas<'_>) -> Drawn,
+) -> io::Result<Markup> {
+    sized(size_px, &format!("style=\"max-width:{widest_px}px\""), paint)
+}
+
 /// Returns a chart with other attributes in the place of its width and height.
 pub(super) fn sized(
     size_px: (u32, u32),
@@ -259,5 +270,10 @@ mod tests {
     fn a_chart_on_a_page_shrinks_with_the_page() {
         let chart = inline(SMALL_PX, |canvas| canvas.draw(&Circle::new((5, 5), 2, BLACK))).unwrap().into_string();
         assert!(chart.starts_with("<svg style=\"max-width:420px\" viewBox=\"0 0 420 220\""), "{chart}");
+        let paint = |canvas: &Canvas<'_>| canvas.draw(&Circle::new((5, 5), 2, BLACK));
+        let map = scaled(MAP_PX, WIDEST_MAP_PX, paint).unwrap().into_string();
+        assert!(map.starts_with("<svg style=\"max-width:620px\" viewBox=\"0 0 400 360\""), "{map}");
+        // The frame of a page of 390 px is 360 px wide, and letters are smaller than their font size (see `LABEL_PX`).
+        assert!(f64::from(LABEL_PX) / 1.24 * 360.0 / f64::from(MAP_PX.0) > 9.0);
     }
 }

@@ -197,10 +197,10 @@ pub(super) fn legend(lines: &[Line<'_>]) -> Markup {
         }
     };
     html! {
-        ul style="list-style: none; margin: 8px 0; padding: 0 12px; font-size: 13.5px" {
+        ul.lines {
             @for (index, line) in lines.iter().enumerate() {
                 li {
-                    svg width="34" height="10" aria-hidden="true" style="vertical-align: middle; margin-right: 8px" {
+                    svg.swatch width="34" height="10" aria-hidden="true" {
                         path d="M0 5H34" stroke=(line.colour()) stroke-width="2.5" stroke-dasharray=(line.dash()) {}
                     }
                     (line.name) (note(index))

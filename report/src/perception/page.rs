@@ -1,6 +1,6 @@
 //! The page: the curves of each factor, and the figures of each case.
 
-use crate::page::{document, number_heads, table, text_heads};
+use crate::page::{document, head, number_heads, table, text_heads};
 use maud::{Markup, html};
 
 use super::chart::{COLOURS, Chart, Line, legend};
@@ -20,11 +20,13 @@ pub(super) fn page(studies: &[Study]) -> Markup {
             factors.push(case.factor);
         }
     }
+    let about = studies.iter().zip(&names);
+    let about =
+        about.map(|(study, name)| format!("{name}: {} approaches of each case, seed {}", study.runs, study.seed));
     let body = html! {
-        h1 { (title) }
-        @for (study, name) in studies.iter().zip(&names) {
-            p { (name) ": " (study.runs) " approaches of each case, seed " (study.seed) ". A vehicle comes from "
-                (GAPS_M[0]) " m behind the ego to " (GAPS_M[1]) " m, at 10 to 50 km/h more. No controller acts." }
+        (head(&title, &[], &about.collect::<Vec<_>>().join("; ")))
+        p {
+            "A vehicle comes from " (GAPS_M[0]) " m behind the ego to " (GAPS_M[1]) " m, at 10 to 50 km/h more. No controller acts."
         }
         p { "Bars are 95 % intervals (Clopper and Pearson). There are three errors: of the position of the front along the road, of the \
              position across it, and of the speed. An error has no value at a distance at which fewer than two approaches have a track." }
@@ -87,11 +89,11 @@ fn lines<'a>(studies: &'a [Study], names: &[&str]) -> Vec<Line<'a>> {
 /// Returns the charts of some lines with their legend.
 fn charts(lines: &[Line<'_>]) -> Markup {
     html! {
-        div.charts style="margin-bottom: 12px" {
+        div.charts.of-case {
             figure { (Chart::PROBABILITY.svg(lines)) }
             div { (legend(lines)) }
         }
-        div.charts style="margin-bottom: 24px" {
+        div.charts.errors {
             @for chart in &Chart::ERRORS { figure { (chart.svg(lines)) } }
         }
     }

@@ -24,7 +24,7 @@ use super::boundary::{
 use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, others, short};
 use super::sensitivity::{SensitivityText, conclusion};
 use super::tornado::charts as tornado_charts;
-use crate::campaign::html::page::{document, number, table, text_heads};
+use crate::campaign::html::page::{document, head, number, table, text_heads};
 use crate::json;
 
 /// A study with its outputs: text (`Display`), JSON, and files.
@@ -128,18 +128,6 @@ fn errors(errors: &RunErrors, runs: &str) -> Markup {
     html! { @for line in error_lines(errors, runs) { p.failure { (line) } } }
 }
 
-fn head(title: &str, settings: &[String], line: &str) -> Markup {
-    html! {
-        header {
-            div {
-                h1 { (title) }
-                p.what { (line) }
-                @for setting in settings { p.note { "with " code { (setting) } } }
-            }
-        }
-    }
-}
-
 fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
     let title = format!("Sensitivity: {}", study.scenario);
     let about = format!(
@@ -155,7 +143,7 @@ fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
         @for (index, output) in study.outputs.iter().enumerate() {
             section {
                 h2 { (output.title()) }
-                @if let Some((_, svg)) = charts.get(index) { figure { (PreEscaped(svg)) } }
+                @if let Some((_, svg)) = charts.get(index) { figure.broad tabindex="0" { (PreEscaped(svg)) } }
                 @if let Some(decomposition) = &study.decomposition {
                     @let of_output = &decomposition.indices[index];
                     p.note {
@@ -224,7 +212,7 @@ fn anchor_page(anchor: &Anchor, charts: &Charts) -> Markup {
         (head(title, &anchor.settings, &about))
         @for quantity in Quantity::ALL { p { strong { (anchor_conclusion(anchor, quantity)) } } }
         (errors(&anchor.errors, "samples"))
-        @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
+        @for (_, svg) in charts { figure.broad tabindex="0" { (PreEscaped(svg)) } }
         section { h2 { "Drivers" } (rows("drivers", &anchor.members)) }
         section { h2 { "One assumption varied" } (rows("assumption", &anchor.variations)) }
     };
@@ -245,7 +233,7 @@ fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
             "in another of the three. All combinations run the same samples. Lines are 95 % intervals. Overlapping "
             "intervals do not tell two combinations apart."
         }
-        @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
+        @for (_, svg) in charts { figure.broad tabindex="0" { (PreEscaped(svg)) } }
         section {
             h2 { "Combinations" }
             (table(&text_heads(&heads), &html! {
@@ -273,7 +261,7 @@ fn boundary_page(boundary: &Boundary, charts: &Charts) -> Markup {
         p { "Event: " code { (boundary.event) } ". " (ranges(boundary)) "." }
         (errors(&boundary.errors, "runs"))
         @for line in verdict(boundary) { p.failure { (line) } }
-        @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
+        @for (_, svg) in charts { figure.broad tabindex="0" { (PreEscaped(svg)) } }
         p.note {
             "Orange runs: the event happens; grey runs: it does not; black runs: no value. The line is where a Gaussian process "
             "puts the boundary. In the grey band the event is not decided with 95 %; in the light orange area it happens."

@@ -12,13 +12,12 @@
 //! is beside it: always below a speed difference of 20 km/h, in 59 % of the cases up to 25 km/h,
 //! and never above 30 km/h.
 
-mod page;
 mod point;
 mod run;
 mod svg;
 mod table;
 
-pub use page::write_map;
 pub use point::{MapPoint, PAPER_IN_TIME};
 pub use run::{Map, MapError, MapGrid, map};
-pub use table::MapText;
+pub use svg::panel;
+pub use table::{MapText, csv};

@@ -13,7 +13,7 @@ const BOTTOM: f64 = 44.0;
 const RIGHT: f64 = 16.0;
 
 /// Returns the panel of one front time headway as SVG.
-pub(super) fn panel(map: &Map, front_thw_s: f64) -> String {
+pub fn panel(map: &Map, front_thw_s: f64) -> String {
     let grid = &map.grid;
     let (columns, rows) = (grid.closing_kmh.len() as f64, grid.detection_m.len() as f64);
     let title = format!("front time headway {front_thw_s} s: margin in the loop (theory below) [s]");

@@ -48,7 +48,7 @@ impl fmt::Display for MapText<'_> {
 }
 
 /// Returns the points as CSV.
-pub(super) fn csv(map: &Map) -> String {
+pub fn csv(map: &Map) -> String {
     let mut text =
         "closing_kmh,detection_m,front_thw_s,planned_mps2,theory_s,theory_at_once_s,loop_s,in_time_in_theory,\
                     in_time_in_loop,reason\n"

@@ -57,7 +57,7 @@ fn of_event(event: &EventInfluence) -> io::Result<Markup> {
     let texts = TornadoTexts { heads, scale: "smallest and largest rate over the parts of the distribution [%]" };
     let chart = tornado(&bars, 100.0 * event.events as f64 / event.samples as f64, texts)?;
     Ok(html! {
-        figure.map { (PreEscaped(chart)) }
+        figure.broad.causes tabindex="0" { (PreEscaped(chart)) }
         details {
             summary { "Figures" }
             (table(&text_heads(&["parameter", "first-order index", "95 % interval", "rate in each part, in rising order"]), &html! {

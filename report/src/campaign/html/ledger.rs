@@ -1,7 +1,10 @@
 //! The counts: how often the ego collides in each arm, the confidence of this rate, and the changes
 //! by the system under test.
+//!
+//! Many scenarios have a row each, those with the worst gates first. Intervals, bars and causes are folded then.
 
 use super::super::text::{goals, imposed, not_prevented};
+use std::cmp::Reverse;
 use std::io;
 
 use maud::{Markup, html};
@@ -10,10 +13,96 @@ use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::charts;
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
+use closecall_campaign::gate::Standing;
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
+
+/// Number of rows of the table on the screen if there are many scenarios. The others are folded. Paper has all rows.
+const ROWS: usize = 6;
+
+/// Returns the counts of the campaign.
+pub(super) fn counts(findings: &Findings<'_>) -> io::Result<Markup> {
+    if !findings.has_many() {
+        return collisions(findings);
+    }
+    let rows = worst_first(findings);
+    let (first, others) = rows.split_at(rows.len().min(ROWS));
+    let head = compact_head(findings.summary);
+    let compact = |rows: &[Row<'_>]| table(&head, &html! { @for row in rows { (compact_row(row)) } });
+    Ok(html! {
+        h2 { "Counts of each scenario" }
+        div.screen {
+            (compact(first))
+            details { summary { (counted(others.len(), "more scenario")) } (compact(others)) }
+        }
+        div.paper.counts { (compact(&rows)) }
+        p.note { (RATES_NOTE) }
+        details { summary { "Intervals, pairs and causes in each scenario" } (collisions(findings)?) }
+    })
+}
+
+/// A scenario of the compact table.
+struct Row<'a> {
+    name: &'a str,
+    counts: &'a Counts,
+    is_paired: bool,
+    /// Numbers of gates that are not met, and that are undecided.
+    gates: [usize; 2],
+}
+
+/// Returns the scenarios: most missed gates first, then most induced collisions and most collisions of the arm under
+/// test.
+fn worst_first<'a>(findings: &Findings<'a>) -> Vec<Row<'a>> {
+    let of_standing = |name: &str, standing: Standing| {
+        findings.judged.gates.iter().filter(|gate| gate.scenario == name && gate.standing() == standing).count()
+    };
+    let row = |(name, counts): &'a (String, Counts)| Row {
+        name,
+        counts,
+        is_paired: findings.summary.is_paired(),
+        gates: [of_standing(name, Standing::Fail), of_standing(name, Standing::Inconclusive)],
+    };
+    let mut rows: Vec<Row<'a>> = findings.summary.scenarios.iter().map(row).collect();
+    let collisions = |row: &Row<'_>| row.counts.arms.last().map_or(0, |tested| tested.collisions);
+    rows.sort_by_key(|row| Reverse((row.gates[0], row.counts.pairs.induced, collisions(row))));
+    rows
+}
+
+fn compact_head(summary: &Summary) -> Markup {
+    html! {
+        th { "scenario" }
+        (number_heads(&["samples"]))
+        @for controller in &summary.controllers { th.number { "collisions with " (controller) } }
+        @if summary.is_paired() { (number_heads(&["prevented", "induced", "in both"])) }
+        (number_heads(&["gates not met", "undecided", "errors"]))
+    }
+}
+
+fn compact_row(row: &Row<'_>) -> Markup {
+    let counts = row.counts;
+    let collisions = |arm: &ArmCounts| {
+        let rate = arm.collision_rate().map_or_else(String::new, |rate| format!(" ({})", percent(rate)));
+        format!("{}{rate}", arm.collisions)
+    };
+    html! {
+        tr.collided[row.gates[0] > 0] {
+            td { (row.name) }
+            (number(counts.samples))
+            @for arm in &counts.arms { (number(collisions(arm))) }
+            @if row.is_paired { (number(counts.pairs.prevented)) (number(counts.pairs.induced)) (number(counts.pairs.both)) }
+            (number(row.gates[0]))
+            (number(row.gates[1]))
+            (number(counts.errors()))
+        }
+    }
+}
+
+/// What a rate says.
+const RATES_NOTE: &str = "Rates are conditional on the sampled scenario: they say how often a sampled encounter ends in a collision of \
+                          the ego, not how often this happens on a road.";
 
 /// Returns the collisions of each arm, and of pairs of arms if the campaign is paired.
 pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
@@ -50,8 +139,7 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
         @if summary.is_paired() { (pairs(scenarios, summary.inference)?) }
         @if summary.has_references() { (arm_pairs(summary)) }
         p.note {
-            "Rates are conditional on the sampled scenario: they say how often a sampled encounter ends in a collision of "
-            "the ego, not how often this happens on a road. Touches: samples in which two bumpers meet at less than 0.67 m/s; they are no "
+            (RATES_NOTE) " Touches: samples in which two bumpers meet at less than 0.67 m/s; they are no "
             "collisions. R brakes > 3 m/s²: samples in which the vehicle behind brakes harder before the lead vehicle brakes."
         }
     })
@@ -185,5 +273,16 @@ pub(super) fn validity(findings: &Findings<'_>) -> Markup {
             }
         }
     };
-    html! { h2 { "Validity of the simulation" } (table(&head, &rows)) }
+    let total = summary.total().checks;
+    let broken: u64 = total.broken().map(|(_, count)| count).sum();
+    html! {
+        h2 { "Validity of the simulation" }
+        @if findings.has_many() {
+            p {
+                (counted(total.runs, "run")) " checked: " (counted(total.flips, "verdict")) " flipped at half the time step, "
+                (counted(broken, "difference")) " in another check."
+            }
+            details { summary { "Checks of each scenario" } (table(&head, &rows)) }
+        } @else { (table(&head, &rows)) }
+    }
 }

@@ -4,7 +4,8 @@
 //!  report.html
 //!    verdict in a sentence, signature  what decides the exit code
 //!    gates in plain words              the worst first; those that are met are folded
-//!    collisions, pairs                 counts with their intervals
+//!    remarks on single scenarios       folded
+//!    collisions, pairs                 counts with their intervals; one row for each of many scenarios
 //!    worst samples                     pictures with links to their recordings and incident cards, outcome map
 //!    causes, each scenario             folded: worst samples, what moves the result, margins, coverage
 //!    provenance                        what a repetition needs

@@ -23,6 +23,19 @@ pub fn document(title: &str, body: &Markup) -> Markup {
     }
 }
 
+/// Returns the head of the page of a study: its title, a line about it, and the settings of its scenario.
+pub fn head(title: &str, settings: &[String], line: &str) -> Markup {
+    html! {
+        header {
+            div {
+                h1 { (title) }
+                p.what { (line) }
+                @for setting in settings { p.note { "with " code { (setting) } } }
+            }
+        }
+    }
+}
+
 /// Returns a table; `head` holds cells, `rows` holds rows. On a narrow page each row becomes a list
 /// in which every cell has the name of its column, and on a page that is wider but not wide enough
 /// the table scrolls sideways.
@@ -99,6 +112,20 @@ mod tests {
         let table = table(&head, &rows).into_string();
         let body = table.split_once("<tbody>").unwrap().1;
         assert_eq!(body.matches("data-name=\"sample\"").count(), 2, "{body}");
+    }
+
+    #[test]
+    fn paper_has_the_sections_of_a_study() {
+        let hiding = STYLE.split('}').filter(|rule| rule.contains("display: none"));
+        let selectors: Vec<&str> = hiding.filter_map(|rule| rule.rsplit('{').nth(1)).collect();
+        assert!(selectors.iter().any(|selector| selector.contains(".scenario")), "{selectors:?}");
+        for selector in selectors.iter().flat_map(|list| list.rsplit("*/").next().unwrap_or_default().split(',')) {
+            let selector = selector.trim();
+            assert!(!selector.starts_with("section") && selector != "figure" && selector != "table", "{selector}");
+        }
+        let page = document("Study", &html! { (head("Study", &["a=1".to_owned()], "b")) section { h2 { "Factors" } } });
+        let page = page.into_string();
+        assert!(page.contains("<main><header><div><h1>Study</h1>") && page.contains("<code>a=1</code>"), "{page}");
     }
 
     #[test]

@@ -18,6 +18,13 @@ pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
     html! {
         h2 { "How it was made" }
         (table(&text_heads(&["", ""]), &rows))
+        @if findings.has_many() {
+            details {
+                summary { "Files of the scenarios" }
+                @let rows = html! { @for (name, value) in files(findings) { tr { td { (name) } td { code { (value) } } } } };
+                (table(&text_heads(&["", ""]), &rows))
+            }
+        }
         details { summary { "Where the sampled values come from" }
         @for file in findings.files {
             @if file.space().iter().len() > 0 {
@@ -42,8 +49,10 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
         entries.push(("configuration", format!("BLAKE3 {}", blake3::hash(json.as_bytes()).to_hex())));
     }
     entries.push(("page written on", format!("{} (UTC)", today())));
-    for scenario in &manifest.scenarios {
-        entries.push(("scenario", format!("{} ({}), BLAKE3 {}", scenario.name, scenario.path, scenario.blake3)));
+    if findings.has_many() {
+        entries.push(("scenarios", format!("{}, whose files are in the configuration", manifest.scenarios.len())));
+    } else {
+        entries.extend(files(findings));
     }
     let sampling = manifest.sampling;
     let sensors = manifest.sensors.map_or_else(|| "those of the scenario".to_owned(), |mode| mode.name().to_owned());
@@ -61,6 +70,14 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
         entries.push(("network", format!("{} on {}, BLAKE3 {}", model.name, model.backend, model.blake3)));
     }
     entries
+}
+
+/// Returns the files of the scenarios with their hashes.
+fn files(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
+    let scenarios = findings.manifest.scenarios.iter();
+    scenarios
+        .map(|scenario| ("scenario", format!("{} ({}), BLAKE3 {}", scenario.name, scenario.path, scenario.blake3)))
+        .collect()
 }
 
 fn source_of(provenance: &Provenance) -> (&'static str, String) {

@@ -24,7 +24,7 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
     // The map of the only scenario, and of the worst, stands above.
     let is_above = worst_scenario(findings).is_some_and(|worst| worst.name == scenario.name);
     Ok(html! {
-        section {
+        section.scenario {
             h2 { (scenario.name) }
             @if let Some(file) = file { p.what { (file.config().description) } (faults(file)) }
             (samples::errors(findings, scenario))
@@ -74,7 +74,8 @@ pub(super) fn evidence(findings: &Findings<'_>) -> io::Result<Markup> {
             div.stills {
                 @for (still, recording) in stills {
                     figure {
-                        a href=(recording) { (PreEscaped(&still.svg)) }
+                        @let name = format!("Recording of {}, sample {}", still.scenario, still.sample);
+                        a href=(recording) aria-label=(name) { (PreEscaped(&still.svg)) }
                         figcaption {
                             strong { (still.verdict) } " " (still.scenario) ", sample " (still.sample) ": " (still.sentence) ". "
                             a href=(recording) { "Recording" } ", " a href=(card_beside(recording)) { "incident card" }

@@ -21,16 +21,16 @@ use crate::campaign::{Still, Tally};
 
 /// Returns the page of 30 samples with and without the margin increase system.
 fn page() -> String {
-    reported(|findings| campaign(findings).unwrap().into_string())
+    reported(&["low-thw-overtake"], 30, |findings| campaign(findings).unwrap().into_string())
 }
 
-/// Returns the data of a report of 30 samples with and without the margin increase system.
-fn reported(report: impl FnOnce(&Findings<'_>) -> String) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
-    let file = ScenarioFile::load(&path, &[]).unwrap();
-    let sampling = Sampling { seed: 1, design: Design::Random, samples: 30 };
+/// Returns what a report makes of some samples of scenarios of the library with and without the margin increase system.
+fn reported(names: &[&str], samples: u64, report: impl FnOnce(&Findings<'_>) -> String) -> String {
+    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
+    let file = |name: &&str| ScenarioFile::load(&library.join(format!("{name}.toml")), &[]).unwrap();
+    let sampling = Sampling { seed: 1, design: Design::Random, samples };
     let controllers = vec![ControllerChoice::ACC, ControllerChoice::MIS];
-    let mut plan = Plan::new(vec![file], sampling, controllers).unwrap();
+    let mut plan = Plan::new(names.iter().map(file).collect(), sampling, controllers).unwrap();
     plan.sensors = Some(SensorMode::GroundTruth);
     let (running, manifest): (_, Manifest) = (plan.campaign(), plan.manifest(vec!["closecall".to_owned()]).unwrap());
     let gates = GateSet::of(["count(ego_collided) <= 0".parse().unwrap()]);
@@ -73,7 +73,7 @@ fn reported(report: impl FnOnce(&Findings<'_>) -> String) -> String {
 fn the_verdict_for_ci_servers_is_valid_by_the_schema_of_xunit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("junit.xml");
-    let xml = reported(|findings| {
+    let xml = reported(&["low-thw-overtake"], 30, |findings| {
         write_junit(&path, findings, &[("low-thw-overtake".to_owned(), 1.25)]).unwrap();
         std::fs::read_to_string(&path).unwrap()
     });
@@ -110,8 +110,7 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
         "Signature",
         "page written on",
         "prefers-color-scheme: dark",
-        "figure { overflow-x: auto; } figure svg { width: auto; min-width: 640px; max-width: none !important; }",
-        ".stills svg, .pair svg { min-width: 560px;",
+        "figure svg { display: block; width: 100%; height: auto; margin: 0 auto; }",
     ] {
         assert!(page.contains(part), "{part}");
     }
@@ -125,4 +124,65 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
     }
     // Two arms, and the balance of pairs; one map, the margins and the coverage of each parameter.
     assert!(page.matches("<svg").count() > 3 + 1 + 8, "{}", page.matches("<svg").count());
+}
+
+/// More scenarios than the first screen has room for. The first has gates that fail or stay open.
+const MANY: [&str; 7] = [
+    "low-thw-overtake",
+    "overtake-without-brake",
+    "slow-approach",
+    "left-lane-blocked",
+    "rear-follower-stays",
+    "cut-in-into-margin",
+    "empty-wet-road",
+];
+
+/// Returns a page without its folded parts.
+fn without_folds(page: &str) -> String {
+    let mut shown = String::new();
+    let mut depth = 0_usize;
+    for (index, part) in page.split("<details>").enumerate() {
+        depth += usize::from(index > 0);
+        for (number, piece) in part.split("</details>").enumerate() {
+            depth -= usize::from(number > 0);
+            if depth == 0 {
+                shown.push_str(piece);
+            }
+        }
+    }
+    shown
+}
+
+#[test]
+fn the_first_screen_of_many_scenarios_has_the_gates_and_no_list_of_their_names_or_expectations() {
+    let page = reported(&MANY, 2, |findings| campaign(findings).unwrap().into_string());
+    assert!(page.contains(": 7 scenarios</title>"), "{}", &page[..300]);
+    let shown = without_folds(&page);
+    let (head, body) = shown.split_once("</header>").unwrap();
+    let head = head.split_once("<header").unwrap().1;
+    // The sentence of the verdict names a few.
+    assert!(MANY.iter().filter(|name| head.contains(**name)).count() < 5, "{head}");
+    for folded in ["happened as expected", "extrapolates beyond recorded traffic", ">Collisions of the ego</h2>"] {
+        assert!(page.contains(folded) && !shown.contains(folded), "{folded}");
+    }
+    let at = |text: &str| body.find(text).unwrap_or_else(|| panic!("{text}"));
+    let order = ["; required: at ", "Counts of each scenario", "Worst samples of all scenarios"].map(at);
+    assert!(order.is_sorted(), "{order:?}");
+    // One row for each scenario on paper, and the words that are folded on the screen.
+    let paper = body.split_once("<div class=\"paper counts\">").unwrap().1.split_once("</table>").unwrap().0;
+    assert_eq!(paper.matches("<tr").count(), 1 + MANY.len(), "{paper}");
+    assert!(MANY.iter().all(|name| paper.contains(&format!(">{name}</td>"))), "{paper}");
+}
+
+#[test]
+fn paper_begins_with_the_signature_and_leaves_out_what_is_folded_and_each_scenario() {
+    let page = page();
+    assert!(page.find("Signature").unwrap() < page.find("<h2").unwrap());
+    assert_eq!(page.matches("<section class=\"scenario\">").count(), 1);
+    let (_, print) = page.split_once("/* Paper has what is signed").unwrap();
+    let rule = print.split_once("*/").unwrap().1.trim_start();
+    assert!(rule.starts_with("details, .scenario, .screen { display: none; } .paper { display: block; }"), "{rule}");
+    // Colours of rules for the screen do not enlarge what is printed, and a link without words has a name.
+    assert!(!page.contains("@media (max-width: 1600px)"));
+    assert!(page.contains("aria-label=\"Recording of low-thw-overtake, sample "), "a link to a recording");
 }

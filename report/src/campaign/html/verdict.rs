@@ -20,6 +20,14 @@ const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     }
 }
 
+/// Largest number of remarks in the head of the page. The others are folded.
+const REMARKS: usize = 6;
+/// Largest numbers of gates of the first table that are not met, and that are undecided beside them or alone. The
+/// others are folded. With these, a printed page has the verdict and the first gates.
+const MISSED: usize = 24;
+const UNDECIDED_BESIDE: usize = 6;
+const UNDECIDED_ALONE: usize = 12;
+
 /// Returns the head of the page: the verdict in one sentence, the extent of the campaign, further
 /// remarks, and the fields for a signature.
 pub(super) fn header(findings: &Findings<'_>) -> Markup {
@@ -27,7 +35,11 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     let samples = findings.summary.total().samples;
     let gates: Vec<String> = judged.gates.iter().map(ToString::to_string).collect();
     let sentence = sentence(judged, findings.files.len());
-    let is_below = |reason: &&String| !gates.contains(reason) && !is_said(judged, &sentence, reason);
+    let is_below = |reason: &&String| {
+        !gates.contains(reason) && !judged.background.contains(reason) && !is_said(judged, &sentence, reason)
+    };
+    let remarks: Vec<&String> = judged.reasons.iter().filter(is_below).collect();
+    let (shown, more) = remarks.split_at(remarks.len().min(REMARKS));
     html! {
         header.(verdict_class(judged.verdict())) {
             p.verdict { (judged.word()) }
@@ -35,13 +47,19 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
                 h1 { (sentence) }
                 @if let Some(line) = headline(findings) { p.headline { (line) } }
                 p.what {
-                    (findings.scenario_names()) ": " (findings.summary.controllers.join(" against ")) ", "
+                    (findings.scenarios_title()) ": " (findings.summary.controllers.join(" against ")) ", "
                     (counted(samples, "sample")) ", "
                     (sampling.design.to_string()) " design, seed " (sampling.seed)
                     @if let Some(part) = findings.manifest.partition { ", part " (part.to_string()) }
                 }
-                ul { @for reason in judged.reasons.iter().filter(is_below) { li { (reason) } } }
                 p.what { (LETTERS) "." }
+                @if !findings.names_each() {
+                    details { summary { "Names of the scenarios" } p.note { (findings.scenario_names()) } }
+                }
+                @if !shown.is_empty() { ul { @for reason in shown { li { (reason) } } } }
+                @if !more.is_empty() {
+                    details { summary { (more.len()) " more remarks" } ul { @for reason in more { li { (reason) } } } }
+                }
                 p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
             }
         }
@@ -81,17 +99,36 @@ pub(super) fn gates(findings: &Findings<'_>) -> Markup {
     if findings.judged.gates.is_empty() {
         return Markup::default();
     }
-    let is_met = |gate: &&GateResult| gate.standing() <= Standing::NotChecked;
-    let (met, unmet): (Vec<&GateResult>, Vec<&GateResult>) = worst_first(findings.judged).into_iter().partition(is_met);
+    let gates = worst_first(findings.judged);
+    let with = |standing: Standing| gates.iter().copied().filter(move |gate| gate.standing() == standing);
+    let (missed, undecided) = (with(Standing::Fail).count(), with(Standing::Inconclusive).count());
+    let most_undecided = if missed == 0 { UNDECIDED_ALONE } else { UNDECIDED_BESIDE };
+    let first: Vec<&GateResult> =
+        with(Standing::Fail).take(MISSED).chain(with(Standing::Inconclusive).take(most_undecided)).collect();
+    let others: Vec<&GateResult> =
+        with(Standing::Fail).skip(MISSED).chain(with(Standing::Inconclusive).skip(most_undecided)).collect();
+    let met: Vec<&GateResult> = gates.iter().copied().filter(|gate| gate.standing() <= Standing::NotChecked).collect();
+    let of_others = format!(
+        "further gates: {} not met, {} undecided",
+        missed.saturating_sub(MISSED),
+        undecided.saturating_sub(most_undecided)
+    );
     let unchecked = met.iter().filter(|gate| gate.standing() == Standing::NotChecked).count();
     let counted = match unchecked {
-        0 => format!("{} of {} gates are met", met.len(), met.len() + unmet.len()),
-        _ => format!("{} of {} gates are met, {unchecked} not checked", met.len() - unchecked, met.len() + unmet.len()),
+        0 => format!("{} of {} gates are met", met.len(), gates.len()),
+        _ => format!("{} of {} gates are met, {unchecked} not checked", met.len() - unchecked, gates.len()),
     };
     html! {
         h2 { "Gates" }
-        @if !unmet.is_empty() { (gate_table(&unmet)) }
-        @if !met.is_empty() { details { summary { (counted) } (gate_table(&met)) } } @else { p { (counted) } }
+        @if !first.is_empty() { (gate_table(&first)) }
+        @if !others.is_empty() {
+            p.paper { (of_others) "; report.html has them on the screen." }
+            details { summary { (of_others) } (gate_table(&others)) }
+        }
+        @if met.is_empty() { p { (counted) } } @else {
+            p.paper { (counted) "." }
+            details { summary { (counted) } (gate_table(&met)) }
+        }
     }
 }
 
@@ -108,7 +145,21 @@ fn gate_table(gates: &[&GateResult]) -> Markup {
             }
         }
     };
-    table(&head, &rows)
+    html! { div.gates { (table(&head, &rows)) } }
+}
+
+/// Returns the remarks on single scenarios, folded. Empty if there is none.
+pub(super) fn background(findings: &Findings<'_>) -> Markup {
+    let remarks = &findings.judged.background;
+    if remarks.is_empty() {
+        return Markup::default();
+    }
+    html! {
+        details {
+            summary { (counted(remarks.len(), "remark")) " on single scenarios: what happened as expected, what extrapolates" }
+            ul { @for remark in remarks { li { (remark) } } }
+        }
+    }
 }
 
 /// Returns the table of requirements; empty if the scenarios name none.

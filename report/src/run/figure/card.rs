@@ -23,8 +23,13 @@ const AFTER: Time = Time::from_ms(3_000);
 const STEP: Time = Time::from_ms(200);
 /// Distance at which a vehicle is out of sight (m).
 const AWAY_M: f64 = 400.0;
-/// Size of a plot of headways, and its margin (px).
-const PLOT_PX: [f64; 2] = [700.0, 130.0];
+/// Size of the letter on a vehicle (m in the picture): 11 px on a page of 390 px.
+const LETTER_M: f64 = 3.7;
+/// Height of a capital letter as a share of its size.
+const CAPITAL: f64 = 0.73;
+/// Size of a plot of headways, its font, and its margin (px). It fits a page of 390 px.
+const PLOT_PX: [f64; 2] = [380.0, 150.0];
+const FONT_PX: f64 = 12.0;
 const MARGIN_PX: f64 = 26.0;
 /// Upper end of the axis of headways (s).
 const MOST_THW_S: f64 = 4.0;
@@ -139,7 +144,7 @@ fn vehicle(film: &Film, actor: usize, window: Window) -> Markup {
             animateTransform attributeName="transform" type="translate" dur=(window.duration()) repeatCount="indefinite" values=(positions) {}
             rect x=(format!("{:.1}", -0.5 * length_m)) y=(format!("{:.1}", -0.5 * width_m)) width=(format!("{length_m:.1}"))
                 height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(film, actor)) { title { (film.actors[actor].name) } }
-            text y="1" font-size="2.8" text-anchor="middle" fill="#ffffff" { (letter) }
+            text y=(format!("{:.2}", 0.5 * CAPITAL * LETTER_M)) font-size=(LETTER_M) text-anchor="middle" fill="#ffffff" { (letter) }
         }
     }
 }
@@ -181,7 +186,7 @@ fn headways(film: &Film, window: Window) -> Markup {
         svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label={ "Time headways, " (film.arm_label()) } {
             @for thw_s in [0.0, 1.0, 2.0, 3.0, 4.0] {
                 line x1=(left) x2=(right) y1=(format!("{:.1}", y(thw_s))) y2=(format!("{:.1}", y(thw_s))) stroke="#dfe4ea" {}
-                text x="20" y=(format!("{:.1}", y(thw_s) + 4.0)) font-size="11" text-anchor="end" fill="#55606d" { (format!("{thw_s:.0}")) }
+                text x="20" y=(format!("{:.1}", y(thw_s) + 4.0)) font-size=(FONT_PX) text-anchor="end" fill="#55606d" { (format!("{thw_s:.0}")) }
             }
             line x1=(left) x2=(right) y1=(format!("{:.1}", y(CRITICAL_THW_S))) y2=(format!("{:.1}", y(CRITICAL_THW_S))) stroke=(CRITICAL) stroke-dasharray="4 3" {}
             path fill="none" stroke=(FRONT) stroke-width="2" d=(curve(|frame| (frame.lead(), frame.margins.thw_front_s))) {}
@@ -194,15 +199,24 @@ fn headways(film: &Film, window: Window) -> Markup {
                     animate attributeName=(end) from=(left) to=(right) dur=(window.duration()) repeatCount="indefinite" {}
                 }
             }
-            text x=(left) y=(height - 8.0) font-size="11" fill="#55606d" { (format!("{:.1} s", window.from.s())) }
-            text x=(right) y=(height - 8.0) font-size="11" text-anchor="end" fill="#55606d" { (format!("{:.1} s", window.to.s())) }
+            text x=(left) y=(height - 8.0) font-size=(FONT_PX) fill="#55606d" { (format!("{:.1} s", window.from.s())) }
+            text x=(right) y=(height - 8.0) font-size=(FONT_PX) text-anchor="end" fill="#55606d" { (format!("{:.1} s", window.to.s())) }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::path;
+    use super::super::road::REACH_M;
+    use super::{FONT_PX, LETTER_M, PLOT_PX, path};
+
+    #[test]
+    fn letters_and_ticks_are_legible_in_the_frame_of_a_phone() {
+        // The frame of a page of 390 px.
+        let frame_px = 360.0;
+        assert!(LETTER_M * frame_px / (REACH_M[1] - REACH_M[0]) >= 11.0);
+        assert!(FONT_PX * frame_px / PLOT_PX[0] >= 11.0);
+    }
 
     #[test]
     fn a_curve_does_not_join_the_headways_of_two_vehicles() {

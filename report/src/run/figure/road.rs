@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use crate::run::film::Film;
 
 /// Rear and front end of the visible road, relative to the ego (m).
-pub(super) const REACH_M: [f64; 2] = [-65.0, 75.0];
+pub(super) const REACH_M: [f64; 2] = [-50.0, 70.0];
 /// The road is drawn wider than it is by this factor.
 pub(super) const STRETCH: f64 = 2.0;
 /// Room above and below the road (m in the picture).

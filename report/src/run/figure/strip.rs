@@ -8,12 +8,12 @@ use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame, Part};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
-const ASPHALT: &str = "#e9eaec";
+pub(super) const ASPHALT: &str = "#e9eaec";
 const MARKING: &str = "#9aa0a6";
 const BRAKE: &str = "#ff1a1a";
 const INDICATOR: &str = "#ffab00";
-const CRITICAL: &str = "#c40018";
-const SAFE: &str = "#1e7d32";
+pub(super) const CRITICAL: &str = "#c40018";
+pub(super) const SAFE: &str = "#1a6e2c";
 /// Lengths of the dashes and gaps of a lane marking in the picture (px).
 const DASH: &str = "9 9";
 const SCALE: &str = "#555555";
@@ -174,17 +174,20 @@ impl Strip<'_> {
         self.at(state.s_m + along * 0.5 * size.length_m, state.d_m + across * 0.5 * size.width_m)
     }
 
-    /// Writes the name and the speed of each main vehicle in the picture. `occupied` has the areas
-    /// of other texts. A label covers no other text, and no body if there is room elsewhere. A
-    /// label without room is left out.
+    /// Writes the name and the speed of each main vehicle in the picture, and of each vehicle that
+    /// collides. `occupied` has the areas of other texts. A label covers no other text, and no body
+    /// if there is room elsewhere. A label without room is left out.
     fn labels(&self, svg: &mut Svg, present: &[usize], occupied: &mut Vec<Area>) {
         let bodies: Vec<Area> = present.iter().map(|&actor| self.body(actor)).collect();
         let rank = |actor: &usize| match self.film.actors[*actor].part {
             Part::Ego => 0,
             Part::Lead | Part::Rear => 1,
+            // Who struck whom is told before who drives beside.
+            Part::Other(_) | Part::Background if self.film.collides(*actor) => 1,
             Part::Other(_) | Part::Background => 2,
         };
-        let is_named = |actor: &usize| self.film.is_main(*actor) && overlap(self.body(*actor), self.area);
+        let is_told = |actor: usize| self.film.is_main(actor) || self.film.collides(actor);
+        let is_named = |actor: &usize| is_told(*actor) && overlap(self.body(*actor), self.area);
         let mut named: Vec<usize> = present.iter().copied().filter(is_named).collect();
         named.sort_by_key(rank);
         for actor in named {
@@ -218,7 +221,10 @@ impl Strip<'_> {
             false if ahead_m > 0.0 => ([above, below], [from_rear, centred, from_front]),
             false => ([above, below], [from_front, centred, from_rear]),
         };
-        let places = tops.into_iter().flat_map(|top| {
+        // The name of a vehicle that collides goes a line further away rather than be left out.
+        let further = tops.map(|top| if top < body.top { top - height } else { top + height });
+        let tops = tops.into_iter().chain(further.into_iter().filter(|_| self.film.collides(actor)));
+        let places = tops.flat_map(|top| {
             lefts.map(|left| {
                 let left = left.min(self.area.right() - width).max(self.area.left);
                 Area { left, top, width, height }

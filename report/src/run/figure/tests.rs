@@ -6,8 +6,11 @@ use super::*;
 use crate::run::film::{Film, FilmRecorder, Level};
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::ScenarioFile;
+use closecall_scenarios::outcome::{ClosedBy, Collision, Phase};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::{Arm, RunKey, simulate};
+use closecall_traffic::ActorId;
+use closecall_traffic::geometry::BoxSide;
 
 fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenarios/library/{name}.toml"));
@@ -109,7 +112,7 @@ fn label_areas(svg: &str) -> Vec<[f64; 4]> {
 fn labels_of_several_rear_vehicles_cover_each_other_nowhere_and_lie_on_the_road() {
     for name in ["rear-vehicles-one-after-another", "rear-vehicle-is-followed", "paper-figure"] {
         let films = films(name, &[ControllerChoice::ACC, ControllerChoice::MIS]);
-        let pictures = [(encounter(&films), [78.0, 742.0]), (still(&films[0]), [10.0, 550.0])];
+        let pictures = [(encounter(&films), [78.0, 742.0]), (still(&films[0]), [8.0, 352.0])];
         for (svg, [left, right]) in pictures {
             let areas = label_areas(&svg);
             assert!(areas.len() > 1, "{name}");
@@ -134,4 +137,42 @@ fn a_vehicle_outside_of_the_picture_has_no_label() {
     strip::draw(&mut svg, (film, None), 0, (area, [-65.0, 75.0]));
     let text = svg.finish();
     assert!(text.contains(">E ego ") && !text.contains(">third "), "{text}");
+}
+
+#[test]
+fn a_still_is_narrow_enough_for_a_phone_and_names_a_vehicle_of_the_background_that_collides() {
+    let mut films = films("traffic/busy-overtake", &[ControllerChoice::ACC]);
+    let film = &mut films[0];
+    let text = still(film);
+    let width: f64 = text.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(width <= 360.0 && text.contains("m/s</text>"), "{width}");
+    // A vehicle of the background drives right behind the ego.
+    let index = film.frames.len() / 2;
+    let is_there = |actor: &usize| !film.is_main(*actor) && film.is_present(*actor, index);
+    let other = (0..film.actors.len()).find(is_there).unwrap();
+    let name = film.actors[other].name.clone();
+    let [s_m, d_m] = [film.frames[index].states[film.ego].s_m, film.frames[index].states[film.ego].d_m];
+    film.frames[index].states[other].s_m = s_m - 9.0;
+    film.frames[index].states[other].d_m = d_m;
+    let drawn = |film: &Film| {
+        let mut svg = svg::Svg::new([560.0, 330.0]);
+        let area = svg::Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };
+        strip::draw(&mut svg, (film, None), index, (area, [-65.0, 75.0]));
+        svg.finish()
+    };
+    let label = format!(">{name} ");
+    assert!(!drawn(film).contains(&label), "{label}");
+    let ids = [film.actors[film.ego].name.as_str(), name.as_str()].map(|name| ActorId::new(name).unwrap());
+    let collision = Collision {
+        time: film.frames[index].time,
+        between: ids,
+        struck_side: [BoxSide::Rear, BoxSide::Front],
+        closed_by: ClosedBy::Second,
+        phase: Phase::Critical,
+        relative_speed_mps: 5.0,
+        delta_v_mps: [2.5; 2],
+    };
+    film.outcome.as_mut().unwrap().collisions = vec![collision];
+    assert!(film.collides(other) && film.collides(film.ego), "{name}");
+    assert!(drawn(film).contains(&label), "{}", drawn(film));
 }

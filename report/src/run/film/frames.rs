@@ -254,6 +254,12 @@ impl Film {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.collisions)
     }
 
+    /// Returns true if a vehicle has a part in a collision.
+    pub(in crate::run) fn collides(&self, actor: usize) -> bool {
+        let name = self.actors[actor].name.as_str();
+        self.collisions().iter().any(|collision| collision.between.iter().any(|id| id.as_str() == name))
+    }
+
     /// Returns the first collision of the ego or, if there is none, the first collision of any vehicles.
     pub(in crate::run) fn worst_collision(&self) -> Option<&Collision> {
         let ego = self.actors[self.ego].name.as_str();
