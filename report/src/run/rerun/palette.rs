@@ -83,10 +83,7 @@ pub(super) const fn sky(light: Light) -> Rgba {
 
 /// Returns the colour of something on the ground in this light.
 pub(super) fn lit(colour: Rgba, light: Light) -> Rgba {
-    let share = GROUND_LIGHT[light_index(light)];
-    let [red, green, blue, opacity] = colour;
-    let darker = |channel: u8| (f64::from(channel) * share).round() as u8;
-    [darker(red), darker(green), darker(blue), opacity]
+    scaled(colour, GROUND_LIGHT[light_index(light)])
 }
 
 const fn light_index(light: Light) -> usize {
@@ -132,6 +129,62 @@ pub(super) fn moment(moment: Moment) -> Rgba {
     MOMENTS[index % MOMENTS.len()]
 }
 
+/// What follows an action of the ego stack, in a bar of states. It differs from the grey of a stack
+/// that does nothing.
+pub(super) const AFTERWARDS: Rgba = [64, 80, 124, 255];
+
+/// White, in which the viewer writes on bars of states in both themes.
+const WHITE: Rgba = [255, 255, 255, 255];
+/// Opacity with which the viewer draws a bar of states (Rerun 0.36). The rest of the light is the
+/// background of its theme.
+const BAR_OPACITY: f64 = 0.784;
+/// Least contrast of text (WCAG 2.2, 1.4.3).
+const LEAST_OF_TEXT: f64 = 4.5;
+/// Share by which a bar becomes darker in one step.
+const DARKER_STEP: f64 = 0.02;
+
+/// Returns a shade of a colour, for a bar of states: as dark as it must be for the white text on it
+/// in the light theme.
+pub(super) fn bar(colour: Rgba) -> Rgba {
+    let mut share = 1.0;
+    loop {
+        let shade = scaled(colour, share);
+        if share <= 0.0 || contrast(shown_bar(shade, WHITE), WHITE) >= LEAST_OF_TEXT {
+            return shade;
+        }
+        share -= DARKER_STEP;
+    }
+}
+
+/// Returns a colour with each channel multiplied by `share`.
+fn scaled([red, green, blue, opacity]: Rgba, share: f64) -> Rgba {
+    let darker = |channel: u8| (f64::from(channel) * share).round() as u8;
+    [darker(red), darker(green), darker(blue), opacity]
+}
+
+/// Returns the colour that the viewer shows of a bar in a theme with this background.
+fn shown_bar(bar: Rgba, background: Rgba) -> Rgba {
+    std::array::from_fn(|channel| {
+        let [bar, background] = [bar, background].map(|colour| f64::from(colour[channel]));
+        (BAR_OPACITY * bar + (1.0 - BAR_OPACITY) * background).round() as u8
+    })
+}
+
+/// Returns the relative luminance of a colour after WCAG 2.2.
+fn luminance([red, green, blue, _]: Rgba) -> f64 {
+    let linear = |channel: u8| match f64::from(channel) / 255.0 {
+        low if low <= 0.040_45 => low / 12.92,
+        high => closecall_traffic::maths::powf((high + 0.055) / 1.055, 2.4),
+    };
+    0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
+}
+
+/// Returns the contrast of two colours after WCAG 2.2, 1 to 21.
+fn contrast(first: Rgba, second: Rgba) -> f64 {
+    let [first, second] = [first, second].map(luminance);
+    (first.max(second) + 0.05) / (first.min(second) + 0.05)
+}
+
 /// Returns the colour of a cluster of a scan.
 pub(super) fn cluster(number: u8) -> Rgba {
     // Hues that no vehicle, track or mark has.
@@ -165,23 +218,8 @@ mod tests {
     /// Backgrounds of the plots in the viewer's dark theme and in its light theme (Rerun 0.36).
     const DARK: Rgba = [13, 16, 17, 255];
     const LIGHT: Rgba = [255, 255, 255, 255];
-    /// Least contrast of a graphical object (WCAG 2.2, 1.4.11) and of text (1.4.3).
+    /// Least contrast of a graphical object (WCAG 2.2, 1.4.11).
     const LEAST_OF_CURVES: f64 = 3.0;
-    const LEAST_OF_TEXT: f64 = 4.5;
-
-    /// Returns the relative luminance after WCAG 2.2.
-    fn luminance([red, green, blue, _]: Rgba) -> f64 {
-        let linear = |channel: u8| match f64::from(channel) / 255.0 {
-            low if low <= 0.040_45 => low / 12.92,
-            high => closecall_traffic::maths::powf((high + 0.055) / 1.055, 2.4),
-        };
-        0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
-    }
-
-    fn contrast(first: Rgba, second: Rgba) -> f64 {
-        let [first, second] = [first, second].map(luminance);
-        (first.max(second) + 0.05) / (first.min(second) + 0.05)
-    }
 
     #[test]
     fn curves_are_legible_in_both_themes_and_those_of_the_baseline_are_lighter() {
@@ -197,6 +235,20 @@ mod tests {
         let greys = [OTHER, BACKGROUND].map(|[red, green, blue, _]| [red, green, blue]);
         assert!(greys.iter().all(|grey| grey.iter().max().unwrap() - grey.iter().min().unwrap() <= 12));
         assert!(contrast([255, 176, 59, 255], LIGHT) < LEAST_OF_CURVES, "a curve that does not pass");
+    }
+
+    #[test]
+    fn the_text_on_a_bar_of_states_is_legible_in_both_themes() {
+        let bars = [EGO, FRONT, REAR, CRITICAL, SAFE, WARNING, NEUTRAL, QUIET, AFTERWARDS];
+        for colour in bars.into_iter().chain(MOMENTS) {
+            for background in [DARK, LIGHT] {
+                let contrast = contrast(shown_bar(bar(colour), background), WHITE);
+                assert!(contrast >= LEAST_OF_TEXT, "{colour:?} on {background:?}: {contrast:.2}");
+            }
+        }
+        assert!(contrast(shown_bar(EGO, LIGHT), WHITE) < LEAST_OF_TEXT, "a bar that does not pass");
+        assert_eq!(bar(WHITE)[3], 255, "a bar stays opaque");
+        assert_ne!(bar(AFTERWARDS), bar(QUIET));
     }
 
     #[test]

@@ -23,9 +23,10 @@ use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 /// Width of a curve (UI points).
-const LINE_WIDTH: f32 = 2.0;
-/// Width of a curve that is less important (UI points).
-const THIN_LINE_WIDTH: f32 = 1.0;
+const LINE_WIDTH: f32 = 3.0;
+/// Width of a curve that is less important (UI points). The edges of a curve fade over one pixel: a
+/// narrower one has no pixel in its full colour, and too little contrast.
+const THIN_LINE_WIDTH: f32 = 2.0;
 
 /// The role of a film among the films of a recording, which share the plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -115,7 +115,7 @@ const STATES: [Word<'static>; 5] = [
     Word::new(ego_state_name(EgoState::Following), "follow", palette::QUIET),
     Word::new(ego_state_name(EgoState::Increasing), "MIS", palette::EGO),
     Word::new(ego_state_name(EgoState::Holding), "hold", palette::SAFE),
-    Word::new(ego_state_name(EgoState::Releasing), "rel.", palette::NEUTRAL),
+    Word::new(ego_state_name(EgoState::Releasing), "rel.", palette::AFTERWARDS),
     Word::new(ego_state_name(EgoState::EmergencyBraking), "AEB", palette::CRITICAL),
 ];
 
@@ -124,7 +124,7 @@ const PHASES: [Word<'static>; 5] = [
     Word::new(phase_name(Phase::Approach), "app.", palette::QUIET),
     Word::new(phase_name(Phase::Critical), "crit.", palette::CRITICAL),
     Word::new(phase_name(Phase::Overtaking), "overt.", palette::WARNING),
-    Word::new(phase_name(Phase::After), "after", palette::NEUTRAL),
+    Word::new(phase_name(Phase::After), "after", palette::AFTERWARDS),
 ];
 
 /// Returns the name of a phase of the encounter.
@@ -316,7 +316,7 @@ impl Plots<'_> {
         let configuration = StateConfiguration::new()
             .with_values(bars.keys().map(String::as_str))
             .with_labels(bars.values().map(|(label, _)| *label))
-            .with_colors(bars.values().map(|(_, colour)| *colour));
+            .with_colors(bars.values().map(|(_, colour)| palette::bar(*colour)));
         self.writer.write_static_of_all(&entity, &configuration)?;
         self.writer.write_curve_of_all(&entity, &times, |range| {
             StateChange::new().with_state(shown[range].iter().map(String::as_str)).columns_of_unit_batches()

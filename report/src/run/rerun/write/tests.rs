@@ -166,7 +166,7 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
     }
     let verdict = summary::verdict(&films);
-    assert!(verdict.starts_with("### Recorded, and with MIS") && verdict.contains("- **recorded:** "), "{verdict}");
+    assert!(verdict.starts_with("### Recorded, and with MIS") && verdict.contains("- **recorded: "), "{verdict}");
 }
 
 #[test]
@@ -461,16 +461,59 @@ fn the_verdict_on_a_pair_is_its_first_word() {
     let [baseline, tested] = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let first = |films: &[Film]| summary::verdict(films).lines().next().unwrap_or_default().to_owned();
     let sample = " · paper-figure · seed 1 · sample 0";
-    assert_eq!(first(&[baseline.clone(), tested.clone()]), format!("**PREVENTED**{sample}"));
-    assert_eq!(first(&[tested.clone(), baseline.clone()]), format!("**INDUCED**{sample}"));
-    assert_eq!(first(&[baseline.clone(), baseline.clone()]), format!("**BOTH COLLIDE**{sample}"));
-    assert_eq!(first(&[tested.clone(), tested.clone()]), format!("**NEITHER COLLIDES**{sample}"));
+    assert_eq!(first(&[baseline.clone(), tested.clone()]), format!("**PREVENTED{sample}**"));
+    assert_eq!(first(&[tested.clone(), baseline.clone()]), format!("**INDUCED{sample}**"));
+    assert_eq!(first(&[baseline.clone(), baseline.clone()]), format!("**BOTH COLLIDE{sample}**"));
+    assert_eq!(first(&[tested.clone(), tested.clone()]), format!("**NEITHER COLLIDES{sample}**"));
     let text = summary::verdict(&[baseline, tested]);
-    assert!(text.contains("- **without MIS:** R struck E from behind at "), "{text}");
+    assert!(text.contains("- **without MIS: R struck E from behind at "), "{text}");
     assert!(text.contains(" s after F braked"), "{text}");
-    assert!(text.contains("- **with MIS:** no vehicle collided; F braked at "), "{text}");
-    assert!(text.contains("; the MIS engaged at ") && text.contains("; faults: none\n"), "{text}");
-    assert!(text.contains("- Smallest headway: front "), "{text}");
+    assert!(text.contains("- **with MIS: no vehicle collided; F braked at "), "{text}");
+    assert!(text.contains("; the MIS engaged at ") && text.contains("; faults: none**\n"), "{text}");
+    assert!(text.contains("- **Smallest headway: front "), "{text}");
+}
+
+#[test]
+fn every_line_of_verdict_and_story_is_in_the_strong_colour() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
+    for page in [summary::verdict(&films), summary::story(&films)] {
+        for line in page.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
+            match line.strip_prefix('|') {
+                Some(_) if line.starts_with("| ---") => {}
+                Some(cells) => {
+                    let cells: Vec<&str> = cells.trim_end_matches('|').split('|').map(str::trim).collect();
+                    assert_eq!(cells.len(), 2, "{line}");
+                    assert!(cells.iter().all(|cell| cell.starts_with("**") && cell.ends_with("**")), "{line}");
+                }
+                None => {
+                    let text = line.trim_start_matches("- ");
+                    assert!(text.starts_with("**") && text.ends_with("**"), "{line}");
+                    assert_eq!(text.matches("**").count(), 2, "{line}");
+                }
+            }
+        }
+    }
+}
+
+/// The narrowest curve that has a pixel in its full colour (UI points): the edges fade over one pixel.
+const LEAST_WIDTH: f32 = 2.0;
+
+#[test]
+fn no_curve_is_so_thin_that_its_colour_fades() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let data = chunks(&[film(ControllerChoice::ACC), film(ControllerChoice::MIS)], StoreKind::Recording);
+    let mut widths = 0;
+    for chunk in &data {
+        let columns = chunk.components().values();
+        for column in columns.filter(|column| column.descriptor.component.as_str() == "SeriesLines:widths") {
+            for width in column.list_array.values().as_primitive::<Float32Type>().values() {
+                assert!(*width >= LEAST_WIDTH, "{}: {width}", chunk.entity_path());
+                widths += 1;
+            }
+        }
+    }
+    assert!(widths > 20, "{widths}");
 }
 
 #[test]
