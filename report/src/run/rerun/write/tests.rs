@@ -409,6 +409,35 @@ fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
 }
 
 #[test]
+fn each_of_two_collisions_is_readable_in_the_row_of_states() {
+    let mut film = filmed("paper-figure", ControllerChoice::ACC, (None, Level::Events));
+    let first = film.worst_collision().unwrap().clone();
+    let lead =
+        library("paper-figure").config().actors.iter().map(|actor| actor.id.clone()).find(|id| !first.involves(id));
+    let ego = film.outcome().unwrap().ego.clone();
+    let second = Collision {
+        time: first.time + Time::from_ms(640),
+        between: [ego, lead.unwrap()],
+        struck_side: [BoxSide::Front, BoxSide::Rear],
+        closed_by: ClosedBy::First,
+        ..first.clone()
+    };
+    let expected = format!("none until R → E at {:.1} s, then E → F at {:.1} s", first.time.s(), second.time.s());
+    film.outcome.as_mut().unwrap().collisions = vec![first, second];
+    let data = chunks(&[film], StoreKind::Recording);
+    let of = |component: &str| -> Vec<String> {
+        let row = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/4_collisions/without_MIS");
+        row.flat_map(|chunk| texts(chunk, component)).collect()
+    };
+    let (labels, values) = (of("StateConfiguration:labels"), of("StateConfiguration:values"));
+    assert!(labels.contains(&expected), "{labels:?}");
+    assert!(
+        values.iter().any(|value| value.contains("R struck E") && value.contains(", then E struck F")),
+        "{values:?}"
+    );
+}
+
+#[test]
 fn both_halves_of_a_pair_open_at_the_same_moment() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
