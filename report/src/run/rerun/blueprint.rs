@@ -179,10 +179,10 @@ fn bird(films: &[FilmContents]) -> Option<Node> {
     let shown: Vec<&FilmContents> = films.iter().filter(|film| film.has_scene).collect();
     let low = shown.iter().map(|film| film.bird_range[0]).min_by(f64::total_cmp)?;
     let high = shown.iter().map(|film| film.bird_range[1]).max_by(f64::total_cmp)?;
-    let subject = if is_traffic(films) { "vehicle that changes lanes" } else { "ego" };
-    let outlines = if shown.len() > 1 { " · outlines: the other arm" } else { "" };
-    let view = View::new("2D", format!("From above · distance from the {subject} [m]{outlines}"), "/")
-        .with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
+    let subject = if is_traffic(films) { "vehicle that changes lanes" } else { "E" };
+    let outlines = if shown.len() > 1 { " · outlines: other arm" } else { "" };
+    let title = format!("From above [m from {subject} blue] · F orange · R pink · tracks cyan{outlines}");
+    let view = View::new("2D", title, "/").with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
     let bounds = Range2D { x_range: super::bird::X_RANGE_M.into(), y_range: [low, high].into() };
     let road = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
     Some(view.with("VisualBounds2D", VisualBounds2D::new(bounds)).with("Background", road).into())

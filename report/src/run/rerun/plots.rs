@@ -74,7 +74,7 @@ impl Kind {
     pub(super) const fn title(self, is_traffic: bool) -> &'static str {
         match self {
             Self::Acceleration if is_traffic => "Acceleration [m/s²] · subject blue",
-            Self::Headway => "Time headway [s] · F orange · R pink · 0.9 s red",
+            Self::Headway => "Headway [s] · ahead orange, behind pink",
             Self::Acceleration => "Acceleration [m/s²] · E blue · F orange · R pink",
             Self::Speed => "Speed [m/s]",
             Self::Gap => "Gap [m] · seen grey",

@@ -546,6 +546,45 @@ fn no_curve_is_so_thin_that_its_colour_fades() {
 }
 
 #[test]
+fn the_vehicles_next_to_the_ego_have_names_from_above_and_the_scene_shows_no_label() {
+    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Objects));
+    let data = chunks(&[film], StoreKind::Recording);
+    let labels: Vec<String> = data
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
+        .flat_map(|chunk| texts(chunk, "Points2D:labels"))
+        .collect();
+    for name in ["R rear ", "second "] {
+        assert!(labels.iter().any(|label| label.starts_with(name) && label.ends_with(" behind")), "{name}");
+    }
+    for chunk in data.iter().filter(|chunk| chunk.entity_path().to_string().contains("/world/")) {
+        for column in
+            chunk.components().values().filter(|column| column.descriptor.component.as_str().ends_with(":show_labels"))
+        {
+            assert!(
+                !column.list_array.values().as_boolean().iter().flatten().any(|shown| shown),
+                "{}",
+                chunk.entity_path()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
+    let film = filmed("faults/object-ghost", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+    let data = chunks(&[film], StoreKind::Recording);
+    let labels: Vec<String> = data
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
+        .flat_map(|chunk| texts(chunk, "Points2D:labels"))
+        .collect();
+    assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
+    let healthy = chunks(&[default_film()], StoreKind::Recording);
+    assert!(!healthy.iter().any(|chunk| texts(chunk, "Points2D:labels").iter().any(|label| label == "does not exist")));
+}
+
+#[test]
 fn a_collision_of_the_ego_precedes_earlier_ones_of_others() {
     let mut film = default_film();
     let ids: Vec<_> = library("low-thw-overtake").config().actors.iter().map(|actor| actor.id.clone()).collect();
