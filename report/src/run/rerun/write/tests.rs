@@ -166,7 +166,7 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
     }
     let verdict = summary::verdict(&films);
-    assert!(verdict.starts_with("### Recorded, and with MIS") && verdict.contains("- **recorded: "), "{verdict}");
+    assert!(verdict.starts_with("**Recorded, and with MIS**") && verdict.contains("- **recorded: "), "{verdict}");
 }
 
 #[test]
