@@ -498,7 +498,7 @@ fn the_verdict_on_a_pair_is_its_first_word() {
     assert!(text.contains("- **without MIS: R struck E from behind at "), "{text}");
     assert!(text.contains(" s after F braked"), "{text}");
     assert!(text.contains("- **with MIS: no vehicle collided; F braked at "), "{text}");
-    assert!(text.contains("; the MIS engaged at ") && text.contains("; faults: none**\n"), "{text}");
+    assert!(text.contains("; the MIS engaged for R at ") && text.contains("; faults: none**\n"), "{text}");
     assert!(text.contains("- **Smallest headway: front "), "{text}");
 }
 
@@ -571,15 +571,25 @@ fn the_vehicles_next_to_the_ego_have_names_from_above_and_the_scene_shows_no_lab
 }
 
 #[test]
+fn the_verdict_names_the_vehicle_that_was_seen_and_the_vehicle_of_the_engagement() {
+    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Events));
+    let verdict = summary::verdict(&[film]);
+    assert!(verdict.contains("the MIS engaged for R at "), "{verdict}");
+    assert!(!verdict.contains("The vehicle behind was"), "{verdict}");
+}
+
+#[test]
 fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
     let film = filmed("faults/object-ghost", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
-    let data = chunks(&[film], StoreKind::Recording);
+    let data = chunks(std::slice::from_ref(&film), StoreKind::Recording);
     let labels: Vec<String> = data
         .iter()
         .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
         .flat_map(|chunk| texts(chunk, "Points2D:labels"))
         .collect();
     assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
+    let verdict = summary::verdict(&[film]);
+    assert!(verdict.contains("the MIS engaged for a vehicle that does not exist at 2."), "{verdict}");
     let healthy = chunks(&[default_film()], StoreKind::Recording);
     assert!(!healthy.iter().any(|chunk| texts(chunk, "Points2D:labels").iter().any(|label| label == "does not exist")));
 }
