@@ -59,6 +59,8 @@ const LETTER_PX: f64 = 6.2;
 const BETWEEN_LABELS_PX: f64 = 18.0;
 /// Letters of the clock besides the name of the arm.
 const CLOCK_LETTERS: usize = 10;
+/// Word before the time of a film that has ended.
+const ENDED: &str = "ended ";
 // Draw orders: a larger one lies above a smaller one.
 const LANE_ORDER: f32 = 0.0;
 const VELOCITY_ORDER: f32 = 1.0;
@@ -73,6 +75,8 @@ pub(super) struct Canvas<'a> {
     top_m: f64,
     /// True if the metre axis is below this road.
     has_axis: bool,
+    /// True if another film goes on after the end of this one.
+    ends_early: bool,
     /// Least and largest number of pixels of a metre in a window of 1280 x 720 px.
     px_per_m: [f64; 2],
 }
@@ -81,9 +85,11 @@ impl<'a> Canvas<'a> {
     /// Returns the canvases of the films, below each other.
     pub(super) fn of_films(films: &'a [Film]) -> Vec<Self> {
         let mut top_m = 0.0;
+        let end = Film::span(films)[1];
         let mut canvases = Vec::new();
         for (index, film) in films.iter().enumerate() {
-            canvases.push(Self { film, top_m, has_axis: index + 1 == films.len(), px_per_m: [1.0; 2] });
+            let (has_axis, ends_early) = (index + 1 == films.len(), film.end() < end);
+            canvases.push(Self { film, top_m, has_axis, ends_early, px_per_m: [1.0; 2] });
             top_m += ABOVE_M + BELOW_M - film.road.right_edge_m() * STRETCH;
         }
         // The viewer fits the drawing into the view: wide roads make it smaller, and its labels not.
@@ -181,7 +187,8 @@ fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingE
 
 /// Returns the room that the clock takes (m in the picture).
 fn clock_m(canvas: &Canvas<'_>) -> f64 {
-    canvas.label_m(canvas.film.arm_label().chars().count() + CLOCK_LETTERS)
+    let ended = if canvas.ends_early { ENDED.chars().count() } else { 0 };
+    canvas.label_m(canvas.film.arm_label().chars().count() + CLOCK_LETTERS + ended)
 }
 
 /// Returns the text at the end of the row above the road from a collision on.
@@ -198,16 +205,22 @@ fn collision_m(canvas: &Canvas<'_>, row: usize) -> f64 {
         .map_or(0.0, |collision| canvas.label_m(collision_mark(film, collision).chars().count()))
 }
 
+/// Returns the name of the arm with a time. The last frame stays while another film goes on.
+pub(super) fn clock_text(canvas: &Canvas<'_>, time: Time) -> String {
+    let film = canvas.film;
+    let ended = if canvas.ends_early && time == film.end() { ENDED } else { "" };
+    format!("{} · {ended}{:.2} s", film.arm_label(), time.s())
+}
+
 /// Writes the name of the arm with the time of the frame. A label is centred at its point.
 fn write_clock(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
-    let film = canvas.film;
-    let text = |time: &Time| format!("{} · {:.2} s", film.arm_label(), time.s());
     let at = [(canvas.labelled_m()[0] + 0.5 * clock_m(canvas)) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
     let entity = "bird/clock";
     let fixed = Points2D::new([at]).with_colors([palette::LABEL]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(entity, &fixed)?;
     writer.write_rows(entity, times, |range| {
-        Points2D::update_fields().with_labels(times[range].iter().map(text)).columns_of_unit_batches()
+        let texts = times[range].iter().map(|time| clock_text(canvas, *time));
+        Points2D::update_fields().with_labels(texts).columns_of_unit_batches()
     })
 }
 

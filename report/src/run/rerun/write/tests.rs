@@ -461,6 +461,30 @@ fn both_halves_of_a_pair_open_at_the_same_moment() {
 }
 
 #[test]
+fn a_half_that_ends_shortly_before_the_critical_moment_sets_the_moment_of_both() {
+    let film = filmed("overtake-without-brake", ControllerChoice::MIS, (None, Level::Objects));
+    assert!(film.worst_collision().is_none());
+    let critical = film.critical_frame_time();
+    let ended = |before: Time| {
+        let mut early = film.clone();
+        early.frames.retain(|frame| frame.time + before <= critical);
+        early
+    };
+    let early = ended(Time::from_ms(240));
+    let films = [early.clone(), film.clone()];
+    assert_eq!(Film::shown_moment(&films), early.end());
+    let much_earlier = [ended(Time::from_ms(4_000)), film.clone()];
+    assert_eq!(Film::shown_moment(&much_earlier), critical, "the critical moment is shown");
+    let clock = |films: &[Film; 2]| -> Vec<String> {
+        let canvases = bird::Canvas::of_films(films);
+        canvases.iter().map(|canvas| bird::clock_text(canvas, canvas.film.end())).collect()
+    };
+    let expected =
+        [format!("with MIS · ended {:.2} s", early.end().s()), format!("with MIS · {:.2} s", film.end().s())];
+    assert_eq!(clock(&films), expected);
+}
+
+#[test]
 fn a_fault_is_in_the_verdict_and_in_the_states_of_its_sensor() {
     let film = |name| filmed(name, ControllerChoice::MIS, (None, Level::Events));
     for (fault, words, row) in [
