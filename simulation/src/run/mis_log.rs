@@ -87,6 +87,16 @@ pub(super) struct MisLog {
     unavailable: Option<Unavailability>,
 }
 
+/// Returns the reason for an engagement. The first command after emergency braking states its end; its
+/// plan has what the reason of the system would say.
+fn engagement_reason(command: &EgoCommand) -> Reason {
+    match (command.reason, command.plan) {
+        (Reason::BrakingDone, Some(plan)) if plan.goal_in_reach => Reason::Engaged,
+        (Reason::BrakingDone, Some(_)) => Reason::EngagedGoalOutOfReach,
+        (reason, _) => reason,
+    }
+}
+
 /// Reasons, one after the other, for which a run has room from the start: more than most runs have.
 const RESERVED: usize = 32;
 
@@ -115,7 +125,7 @@ impl MisLog {
                 thw_front_s: now.thw_front_s,
                 speed_mps: now.speed_mps,
                 goal_in_reach: now.command.plan.map(|plan| plan.goal_in_reach),
-                reason: now.command.reason,
+                reason: engagement_reason(now.command),
                 is_after_braking: last_state == Some(EgoState::EmergencyBraking),
             });
         }
@@ -123,8 +133,7 @@ impl MisLog {
             && engaged.reason == Reason::BrakingDone
             && now.command.state == EgoState::Increasing
         {
-            // The first command after emergency braking states its end, and the next one why the
-            // system brakes.
+            // A command without a plan: the next one states why the system brakes.
             engaged.reason = now.command.reason;
         }
         let Some(engaged) = self.engaged else { return };
