@@ -85,6 +85,9 @@ pub struct CausalSentence<'a> {
     pub faults: &'a [StatedFault],
     /// The time over which the reason of the MIS held (s), if that is known.
     pub reason_span_s: Option<[f64; 2]>,
+    /// The vehicle for which the MIS engaged, in words, if that is known: its letter or name, or that it
+    /// does not exist.
+    pub engaged_for: Option<&'a str>,
 }
 
 impl CausalSentence<'_> {
@@ -145,7 +148,10 @@ impl CausalSentence<'_> {
             format!(", without its sensors for {:.1} s from {:.1} s on", gone.lasted_s, gone.from_s)
         });
         let did = match mis.engaged_at_s {
-            Ok(engaged_at_s) => format!("the MIS engaged at {engaged_at_s:.1} s{}", self.engaged(mis, engaged_at_s)),
+            Ok(engaged_at_s) => {
+                let vehicle = self.engaged_for.map_or_else(String::new, |vehicle| format!(" for {vehicle}"));
+                format!("the MIS engaged{vehicle} at {engaged_at_s:.1} s{}", self.engaged(mis, engaged_at_s))
+            }
             Err(_) => format!("the MIS stayed off: {}{}", mis.reason, self.reason_span()),
         };
         Some(format!("{did}{gone}"))
@@ -184,7 +190,8 @@ impl CausalSentence<'_> {
 pub fn causal_sentence(scenario: &Scenario, sensors: Option<SensorMode>, outcome: &Outcome) -> String {
     let faults = sensors.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode)).stated_faults();
     let letters = VehicleLetters::of(scenario);
-    CausalSentence { outcome, letters: &letters, faults: &faults, reason_span_s: None }.to_string()
+    let (reason_span_s, engaged_for) = (None, None);
+    CausalSentence { outcome, letters: &letters, faults: &faults, reason_span_s, engaged_for }.to_string()
 }
 
 impl CausalSentence<'_> {
@@ -297,7 +304,7 @@ mod tests {
     }
 
     fn sentence(outcome: &Outcome, faults: &[StatedFault], reason_span_s: Option<[f64; 2]>) -> String {
-        CausalSentence { outcome, letters: &letters(), faults, reason_span_s }.to_string()
+        CausalSentence { outcome, letters: &letters(), faults, reason_span_s, engaged_for: None }.to_string()
     }
 
     #[test]
@@ -346,6 +353,22 @@ mod tests {
             "R struck E from behind at 9.2 m/s (ΔV R 5.2, E 5.1 m/s) at 13.50 s, 4.5 s after F braked; the MIS stayed off: passing \
              lane occupied, 3.6 to 9.6 s; faults: none"
         );
+    }
+
+    #[test]
+    fn an_engagement_for_a_vehicle_that_does_not_exist_says_so() {
+        let mut run = outcome(Vec::new(), Reason::Engaged);
+        run.mis.as_mut().unwrap().engaged_at_s = Ok(2.0);
+        let told = |engaged_for| {
+            let sentence =
+                CausalSentence { outcome: &run, letters: &letters(), faults: &[], reason_span_s: None, engaged_for };
+            sentence.reason()
+        };
+        assert_eq!(
+            told(Some("a vehicle that does not exist")),
+            "the MIS engaged for a vehicle that does not exist at 2.0 s, 7.0 s before F braked; faults: none"
+        );
+        assert_eq!(told(None), "the MIS engaged at 2.0 s, 7.0 s before F braked; faults: none");
     }
 
     #[test]

@@ -13,7 +13,8 @@ impl Film {
     pub(in crate::run) fn sentence(&self) -> Option<CausalSentence<'_>> {
         let outcome = self.outcome.as_ref()?;
         let reason_span_s = self.reason_span_s(outcome);
-        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, reason_span_s })
+        let engaged_for = self.engaged_for();
+        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, reason_span_s, engaged_for })
     }
 
     /// Returns the sentence about the run as text.
@@ -36,6 +37,16 @@ impl Film {
     pub(in crate::run) fn collision_text(&self, collision: &Collision) -> String {
         let sentence = self.sentence();
         sentence.map_or_else(String::new, |told| format!("{} ({})", told.struck(collision), told.delta_v(collision)))
+    }
+
+    /// Returns the letter of a vehicle, or its name if it has none.
+    pub(in crate::run) fn vehicle_letter(&self, actor: usize) -> &str {
+        match self.actors[actor].part {
+            Part::Ego => "E",
+            Part::Lead => "F",
+            Part::Rear => "R",
+            Part::Other(_) | Part::Background => &self.actors[actor].name,
+        }
     }
 
     /// Returns the name of a vehicle after its letter: E is the ego, F the lead vehicle, R the rear

@@ -81,7 +81,7 @@ impl EncounterComparison {
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
         let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm_label(), encounter.start.s());
-        let mut page = format!("### Recorded, and {arm}\n\n");
+        let mut page = format!("**Recorded, and {arm}**\n\n");
         let result = simulated.result().map_or(String::new(), |result| format!("{result}; "));
         for (side, name, result) in [(&self.recorded, "recorded", ""), (&self.simulated, arm, &result)] {
             // Writing to a string cannot fail.

@@ -2,7 +2,7 @@
 //! time, and when it was lost.
 
 use closecall_sensors::SceneVehicle;
-use closecall_traffic::{Source, Time, Track, TrackStatus};
+use closecall_traffic::{Source, Time, Track, TrackId, TrackStatus};
 
 use super::{Film, Frame};
 
@@ -10,9 +10,14 @@ use super::{Film, Frame};
 /// assumption; 3 to 10 are plausible.
 const SAME_VEHICLE_M: f64 = 5.0;
 
+/// The vehicle of a track that belongs to none.
+const NO_VEHICLE: &str = "a vehicle that does not exist";
+
 /// A vehicle behind the ego, as the rear sensors know it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::run) struct RearSeen {
+    /// Number of its track.
+    pub(in crate::run) track: TrackId,
     /// Index of the vehicle among the actors; `None` for a track that belongs to no vehicle.
     pub(in crate::run) actor: Option<usize>,
     /// Distance from its front to the rear of the ego (m).
@@ -63,8 +68,11 @@ pub(super) fn rear_seen(tracks: &[Track], vehicles: &[SceneVehicle], ego: usize)
         (0..vehicles.len()).filter(is_near).min_by(|a, b| lateral_m(a).total_cmp(&lateral_m(b)))
     };
     let ego_length_m = ego_vehicle.vehicle.dimensions.length_m;
-    let rear_vehicle =
-        |track: &Track| RearSeen { actor: belongs(track), gap_m: -track.x_m() - 0.5 * (track.length_m + ego_length_m) };
+    let rear_vehicle = |track: &Track| RearSeen {
+        track: track.id,
+        actor: belongs(track),
+        gap_m: -track.x_m() - 0.5 * (track.length_m + ego_length_m),
+    };
     tracks.iter().filter(is_known).map(rear_vehicle).filter(|rear_vehicle| rear_vehicle.gap_m > 0.0).collect()
 }
 
@@ -87,8 +95,18 @@ impl Film {
         spans
     }
 
-    /// Returns a sentence on when the ego first saw a vehicle behind it, with the weather if that
-    /// is not clear.
+    /// Returns the vehicle for which the system engaged, in words: its letter or its name. `None` if it
+    /// never engaged, or states no track.
+    pub(in crate::run) fn engaged_for(&self) -> Option<&str> {
+        let engaged_at = Time::from_s(self.outcome.as_ref()?.mis.as_ref().ok()?.engaged_at_s.ok()?);
+        let frame = self.frame_at(engaged_at)?;
+        let track = frame.command?.plan?.track;
+        let seen = frame.rear_seen.iter().find(|vehicle| vehicle.track == track)?;
+        Some(seen.actor.map_or(NO_VEHICLE, |actor| self.vehicle_letter(actor)))
+    }
+
+    /// Returns a sentence on when the ego first saw the relevant vehicle behind it, with the weather if
+    /// that is not clear.
     pub(in crate::run) fn sight(&self) -> Option<String> {
         let spans = self.known_spans();
         if spans.is_empty() {
@@ -97,11 +115,12 @@ impl Film {
         let weather = self.weather().map_or(String::new(), |weather| format!("; {weather}"));
         let first = spans.iter().find_map(|span| Some((span.time, span.from_m?)));
         let lost = self.lost(&spans);
+        let vehicle = self.relevant_rear().map_or("The vehicle behind", |actor| self.vehicle_letter(actor));
         Some(match first {
             Some((time, from_m)) if time > self.frames[0].time => {
-                format!("The vehicle behind was not seen until {:.2} s ({from_m:.0} m{weather}).{lost}", time.s())
+                format!("{vehicle} was not seen behind until {:.2} s ({from_m:.0} m{weather}).{lost}", time.s())
             }
-            Some((_, from_m)) => format!("The vehicle behind was seen from the start ({from_m:.0} m{weather}).{lost}"),
+            Some((_, from_m)) => format!("{vehicle} was seen behind from the start ({from_m:.0} m{weather}).{lost}"),
             None => format!("No vehicle was seen behind{}.", weather.replacen("; ", " (", 1) + closing(&weather)),
         })
     }

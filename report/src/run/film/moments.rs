@@ -5,6 +5,9 @@ use closecall_traffic::Time;
 use super::Film;
 use closecall_scenarios::outcome::ReachedMoment;
 
+/// Time by which the moment at which a recording opens may precede the critical moment.
+const A_LITTLE: Time = Time::from_ms(2_000);
+
 impl Film {
     /// Returns the critical moment of the film, at which its views open.
     ///
@@ -39,10 +42,14 @@ impl Film {
     }
 
     /// Returns the moment at which a recording of these films opens, the same in all of them: the
-    /// collision of the last film that has one, else the critical moment of the last film.
+    /// collision of the last film that has one, else the critical moment of the last film. A film that
+    /// ends a little earlier could only show its last frame, so all show that moment then.
     pub(in crate::run) fn shown_moment(films: &[Self]) -> Time {
         let collided = films.iter().rev().find(|film| film.worst_collision().is_some());
-        collided.or(films.last()).map_or(Time::ZERO, Self::critical_frame_time)
+        let shown = collided.or(films.last()).map_or(Time::ZERO, Self::critical_frame_time);
+        let first_end = films.iter().map(Self::end).min().unwrap_or(shown);
+        let is_a_little_earlier = first_end < shown && shown - first_end <= A_LITTLE;
+        if collided.is_none() && is_a_little_earlier { first_end } else { shown }
     }
 
     /// Returns the times of the first and of the last frame of any of these films.

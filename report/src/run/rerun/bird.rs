@@ -16,12 +16,13 @@
 
 mod names;
 
-use closecall_traffic::{Indicator, Lane, Measured, Source, Time, TrackStatus, maths};
+use closecall_traffic::{Indicator, Lane, Measured, Source, Time, Track, TrackStatus, maths};
 use rerun::{LineStrips2D, Points2D};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
+use super::truth::belongs_to_a_vehicle;
 use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::{CRITICAL_THW_S, Collision};
 
@@ -47,11 +48,19 @@ const AXIS_BELOW_M: f64 = 5.2;
 const AXIS_STEP_M: i32 = 10;
 /// Marks of the axis that have a number are this many steps apart.
 const AXIS_NUMBERED: i32 = 2;
-/// Width of a letter of a label in a window of 1280 px (m in the picture), and of the room between two labels.
-const LETTER_M: f64 = 1.6;
-const BETWEEN_LABELS_M: f64 = 1.5;
+/// Width of the view in a window of 1280 x 720 px (px).
+const VIEW_WIDTH_PX: f64 = 700.0;
+/// Its least and its largest height, by layout, with one road and with two (px).
+const VIEW_HEIGHTS_PX: [[f64; 2]; 2] = [[105.0, 190.0], [155.0, 250.0]];
+/// Share of the visible width that labels may use. In other windows the view has another shape.
+const LABELLED_SHARE: f64 = 0.9;
+/// Width of a letter of a label, and of the box of a label with the room to the next one (px).
+const LETTER_PX: f64 = 6.2;
+const BETWEEN_LABELS_PX: f64 = 18.0;
 /// Letters of the clock besides the name of the arm.
 const CLOCK_LETTERS: usize = 10;
+/// Word before the time of a film that has ended.
+const ENDED: &str = "ended ";
 // Draw orders: a larger one lies above a smaller one.
 const LANE_ORDER: f32 = 0.0;
 const VELOCITY_ORDER: f32 = 1.0;
@@ -66,18 +75,43 @@ pub(super) struct Canvas<'a> {
     top_m: f64,
     /// True if the metre axis is below this road.
     has_axis: bool,
+    /// True if another film goes on after the end of this one.
+    ends_early: bool,
+    /// Least and largest number of pixels of a metre in a window of 1280 x 720 px.
+    px_per_m: [f64; 2],
 }
 
 impl<'a> Canvas<'a> {
     /// Returns the canvases of the films, below each other.
     pub(super) fn of_films(films: &'a [Film]) -> Vec<Self> {
         let mut top_m = 0.0;
+        let end = Film::span(films)[1];
         let mut canvases = Vec::new();
         for (index, film) in films.iter().enumerate() {
-            canvases.push(Self { film, top_m, has_axis: index + 1 == films.len() });
+            let (has_axis, ends_early) = (index + 1 == films.len(), film.end() < end);
+            canvases.push(Self { film, top_m, has_axis, ends_early, px_per_m: [1.0; 2] });
             top_m += ABOVE_M + BELOW_M - film.road.right_edge_m() * STRETCH;
         }
+        // The viewer fits the drawing into the view: wide roads make it smaller, and its labels not.
+        let heights_px = VIEW_HEIGHTS_PX[usize::from(films.len() > 1)];
+        let px_per_m = heights_px
+            .map(|height_px| (VIEW_WIDTH_PX / (X_RANGE_M[1] - X_RANGE_M[0])).min(height_px / (top_m + AXIS_M)));
+        for canvas in &mut canvases {
+            canvas.px_per_m = px_per_m;
+        }
         canvases
+    }
+
+    /// Returns the room that a label takes, with the distance to the next one (m in the picture).
+    fn label_m(&self, letters: usize) -> f64 {
+        (LETTER_PX * letters as f64 + BETWEEN_LABELS_PX) / self.px_per_m[0]
+    }
+
+    /// Returns the left and the right end of the room for labels, relative to the ego (m). It is wider
+    /// than the road that is meant to be shown if the height of the view limits the drawing.
+    fn labelled_m(&self) -> [f64; 2] {
+        let half_m = 0.5 * (X_RANGE_M[1] - X_RANGE_M[0]).max(LABELLED_SHARE * VIEW_WIDTH_PX / self.px_per_m[1]);
+        [-half_m, half_m].map(|side_m| 0.5 * (X_RANGE_M[0] + X_RANGE_M[1]) + side_m)
     }
 
     /// Returns the upper and the lower end of the drawing (m in the picture).
@@ -145,7 +179,7 @@ fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingE
     let numbered: Vec<i32> = marks.into_iter().filter(|mark| mark % AXIS_NUMBERED == 0).collect();
     let numbers = Points2D::new(numbered.iter().map(|&mark| [x(mark), y]))
         .with_labels(numbered.iter().map(|mark| format!("{} m", mark * AXIS_STEP_M)))
-        .with_colors([palette::NOTE])
+        .with_colors([palette::LABEL])
         .with_radii([0.05_f32])
         .with_show_labels(true);
     writer.write_static("bird/axis/numbers", &numbers)
@@ -153,7 +187,8 @@ fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingE
 
 /// Returns the room that the clock takes (m in the picture).
 fn clock_m(canvas: &Canvas<'_>) -> f64 {
-    LETTER_M * (canvas.film.arm_label().chars().count() + CLOCK_LETTERS) as f64 + BETWEEN_LABELS_M
+    let ended = if canvas.ends_early { ENDED.chars().count() } else { 0 };
+    canvas.label_m(canvas.film.arm_label().chars().count() + CLOCK_LETTERS + ended)
 }
 
 /// Returns the text at the end of the row above the road from a collision on.
@@ -167,19 +202,25 @@ fn collision_m(canvas: &Canvas<'_>, row: usize) -> f64 {
     let happened = |collision: &&Collision| film.frames[row].time >= collision.time;
     film.worst_collision()
         .filter(happened)
-        .map_or(0.0, |collision| LETTER_M * collision_mark(film, collision).chars().count() as f64 + BETWEEN_LABELS_M)
+        .map_or(0.0, |collision| canvas.label_m(collision_mark(film, collision).chars().count()))
+}
+
+/// Returns the name of the arm with a time. The last frame stays while another film goes on.
+pub(super) fn clock_text(canvas: &Canvas<'_>, time: Time) -> String {
+    let film = canvas.film;
+    let ended = if canvas.ends_early && time == film.end() { ENDED } else { "" };
+    format!("{} · {ended}{:.2} s", film.arm_label(), time.s())
 }
 
 /// Writes the name of the arm with the time of the frame. A label is centred at its point.
 fn write_clock(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
-    let film = canvas.film;
-    let text = |time: &Time| format!("{} · {:.2} s", film.arm_label(), time.s());
-    let at = [(X_RANGE_M[0] + 0.5 * clock_m(canvas)) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
+    let at = [(canvas.labelled_m()[0] + 0.5 * clock_m(canvas)) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
     let entity = "bird/clock";
-    let fixed = Points2D::new([at]).with_colors([palette::NOTE]).with_radii([0.05_f32]).with_show_labels(true);
+    let fixed = Points2D::new([at]).with_colors([palette::LABEL]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(entity, &fixed)?;
     writer.write_rows(entity, times, |range| {
-        Points2D::update_fields().with_labels(times[range].iter().map(text)).columns_of_unit_batches()
+        let texts = times[range].iter().map(|time| clock_text(canvas, *time));
+        Points2D::update_fields().with_labels(texts).columns_of_unit_batches()
     })
 }
 
@@ -300,37 +341,44 @@ fn write_gaps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Resul
     })
 }
 
-/// Writes the outlines of the confirmed rear tracks that are probably vehicles.
+/// An outline: its corners in the picture, and its colour.
+type Outline = (Vec<[f32; 2]>, Rgba);
+
+/// Writes the outlines of the confirmed rear tracks that are probably vehicles. A track that belongs to
+/// no vehicle has the colour of a false track.
 fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
     let film = canvas.film;
-    let outlines = |frame: &Frame| -> Vec<Vec<[f32; 2]>> {
+    let outlines = |frame: &Frame| -> Vec<Outline> {
         let ego = &frame.states[film.ego];
-        let is_shown = |track: &&closecall_traffic::Track| {
-            track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
-        };
-        let outline = |track: &closecall_traffic::Track| {
+        let outline = |track: &Track| {
             let (half_m, side_m) = (0.5 * track.length_m, 0.5 * track.width_m);
             let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]];
             let corner = |[along, across]: [f64; 2]| {
                 canvas.at(frame, ego.s_m + track.x_m() + along * half_m, ego.d_m + track.y_m() + across * side_m)
             };
-            corners.map(corner).to_vec()
+            let colour = if belongs_to_a_vehicle(film, frame, track) { palette::TRACK } else { palette::FALSE_TRACK };
+            (corners.map(corner).to_vec(), colour)
         };
-        frame.tracks.iter().filter(is_shown).map(outline).collect()
+        frame.tracks.iter().filter(|track| is_shown_track(track)).map(outline).collect()
     };
-    let rows: Vec<Vec<Vec<[f32; 2]>>> = film.frames.iter().map(outlines).collect();
+    let rows: Vec<Vec<Outline>> = film.frames.iter().map(outlines).collect();
     if rows.iter().all(Vec::is_empty) {
         return Ok(());
     }
     let entity = "bird/tracks";
-    let fixed =
-        LineStrips2D::update_fields().with_colors([palette::TRACK]).with_radii([0.25_f32]).with_draw_order(MARK_ORDER);
+    let fixed = LineStrips2D::update_fields().with_radii([0.25_f32]).with_draw_order(MARK_ORDER);
     writer.write_static(entity, &fixed)?;
     writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
-        LineStrips2D::new(rows.iter().flatten().map(|outline| outline.iter().copied()))
+        LineStrips2D::new(rows.iter().flatten().map(|(outline, _)| outline.iter().copied()))
+            .with_colors(rows.iter().flatten().map(|(_, colour)| *colour))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
     })
+}
+
+/// Returns true for a confirmed rear track that is probably a vehicle.
+fn is_shown_track(track: &Track) -> bool {
+    track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
 }
 
 /// Writes a mark on the first vehicle of the worst collision, from the contact on.
@@ -344,10 +392,10 @@ fn write_collisions(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
     let times: Vec<Time> = frames.iter().map(|frame| frame.time).collect();
     let entity = "bird/collision";
     let text = collision_mark(film, collision);
-    let half_m = 0.5 * LETTER_M * text.chars().count() as f64;
-    let text_at = [(X_RANGE_M[1] - half_m) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
+    let half_m = 0.5 * canvas.label_m(text.chars().count());
+    let text_at = [(canvas.labelled_m()[1] - half_m) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
     let fixed = Points2D::update_fields()
-        .with_colors([palette::CRITICAL, palette::text(palette::CRITICAL)])
+        .with_colors([palette::CRITICAL, palette::LABEL])
         .with_radii([1.6_f32, 0.05])
         .with_labels([String::new(), text])
         .with_draw_order(MARK_ORDER)

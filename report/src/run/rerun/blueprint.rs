@@ -56,8 +56,8 @@ pub(super) struct FilmContents {
     pub(super) sky: palette::Rgba,
     /// Lowest and highest position across the road in the view from above (m in the picture).
     pub(super) bird_range: [f64; 2],
-    /// True if there are camera images.
-    pub(super) has_camera: bool,
+    /// Size of the pictures of the camera (px); `None` if there are none.
+    pub(super) camera_px: Option<[f64; 2]>,
     /// True if there are states of the ego stack.
     pub(super) has_states: bool,
     /// The plots that have a curve.
@@ -68,16 +68,16 @@ pub(super) struct FilmContents {
     pub(super) weather: Option<String>,
 }
 
-/// Writes the layout for these films.
-pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(), RecordingError> {
-    let has_camera = films.iter().any(|film| film.has_camera);
-    let left = below(
-        [Some((verdict_share(films), verdict())), bird(films).map(|view| (bird_share(films), view))]
-            .into_iter()
-            .flatten()
-            .chain(scenes(films).map(|view| (scenes_share(films, has_camera), view)))
-            .collect(),
-    );
+/// Writes the layout for these films. `verdict_text` is the text of the verdict.
+pub(super) fn write(recording: &Recording, films: &[FilmContents], verdict_text: &str) -> Result<(), RecordingError> {
+    let has_camera = films.iter().any(|film| film.camera_px.is_some());
+    let views: Vec<(f32, Node)> = bird(films)
+        .map(|view| (bird_share(films), view))
+        .into_iter()
+        .chain(scenes(films).map(|view| (scenes_share(films, has_camera), view)))
+        .collect();
+    let rest = views.iter().map(|(share, _)| share).sum();
+    let left = below(std::iter::once((verdict_share(verdict_text, rest), verdict())).chain(views).collect());
     let mut right = Vec::new();
     let mut plots = films_plots(films);
     if !plots.is_empty() {
@@ -88,7 +88,7 @@ pub(super) fn write(recording: &Recording, films: &[FilmContents]) -> Result<(),
     let told = films.iter().any(|film| film.has_states).then(states).into_iter().chain([log(films), story]);
     right.extend(tabs(told.collect()).map(|node| (5.1, node)));
     // Camera and point cloud need the room.
-    let left_share = if has_camera { 13.0 } else { 11.0 };
+    let left_share = if has_camera { 14.0 } else { 11.0 };
     let columns = [left.map(|node| (left_share, node)), below(right).map(|node| (9.0, node))];
     let root = beside(columns.into_iter().flatten().collect());
     nodes::write(recording, root.unwrap_or_else(verdict), OPENING_TIMELINE)
@@ -99,6 +99,7 @@ fn bird_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
         [_] => 2.6,
+        _ if films.iter().any(|film| film.camera_px.is_some()) => 4.2,
         _ => 4.6,
     }
 }
@@ -106,20 +107,30 @@ fn bird_share(films: &[FilmContents]) -> f32 {
 /// Returns the room for the scenes. With images of the camera they take a third of the window.
 fn scenes_share(films: &[FilmContents], has_camera: bool) -> f32 {
     match has_camera {
-        true if films.len() > 1 => 5.2,
-        true => 6.6,
+        true if films.len() > 1 => 6.4,
+        true => 7.4,
         false if films.len() > 1 || is_traffic(films) => 3.8,
         false => 5.4,
     }
 }
 
-/// Returns the room for the verdict. The verdict on recorded traffic is longer.
-fn verdict_share(films: &[FilmContents]) -> f32 {
-    match films {
-        [_] if is_traffic(films) => 3.4,
-        [_] => 2.3,
-        _ => 3.0,
-    }
+/// Height of the window below its bars, of a line of the verdict, and of what surrounds the lines, in a
+/// window of 1280 x 720 px (px).
+const WINDOW_PX: f32 = 662.0;
+const LINE_PX: f32 = 15.0;
+const AROUND_LINES_PX: f32 = 52.0;
+/// Letters in a line of the verdict there.
+const LINE_LETTERS: usize = 110;
+/// Largest part of the column that the verdict takes.
+const MOST_OF_COLUMN: f32 = 0.4;
+
+/// Returns the room for the verdict, if the other views of the column have the room `rest`: as much as
+/// its lines take in a window of 1280 x 720 px.
+fn verdict_share(told: &str, rest: f32) -> f32 {
+    let letters = |line: &str| line.replace("**", "").chars().count();
+    let lines: usize = told.trim().lines().map(|line| letters(line).div_ceil(LINE_LETTERS).max(1)).sum();
+    let part = ((AROUND_LINES_PX + LINE_PX * lines as f32) / WINDOW_PX).min(MOST_OF_COLUMN);
+    if rest > 0.0 { rest * part / (1.0 - part) } else { 1.0 }
 }
 
 fn verdict() -> Node {
@@ -130,11 +141,8 @@ fn verdict() -> Node {
 /// below each other, and the views of a pair are tabs.
 fn scenes(films: &[FilmContents]) -> Option<Node> {
     let scenes: Vec<(f32, Node)> = films.iter().filter(|film| film.has_scene).map(|film| (1.0, scene(film))).collect();
-    let camera = |film: &FilmContents| {
-        let entity = format!("{}{}", film.root, super::camera::ENTITY);
-        (1.0, View::new("2D", titled("Rear camera", films, film), entity).into())
-    };
-    let cameras: Vec<(f32, Node)> = films.iter().filter(|film| film.has_camera).map(camera).collect();
+    let camera_of = |film: &FilmContents| Some((1.0, camera(titled("Rear camera", films, film), film)?));
+    let cameras: Vec<(f32, Node)> = films.iter().filter_map(camera_of).collect();
     match (scenes.len(), cameras.is_empty()) {
         (_, true) => beside(scenes),
         (1, false) => below(scenes.into_iter().chain(cameras).collect()),
@@ -146,6 +154,15 @@ fn scenes(films: &[FilmContents]) -> Option<Node> {
             tabs(scenes.into_iter().chain(cameras).collect())
         }
     }
+}
+
+/// Returns the view of the pictures of a rear camera, with the strip above them that has the labels.
+fn camera(title: String, film: &FilmContents) -> Option<Node> {
+    let [width_px, height_px] = film.camera_px?;
+    let bounds = Range2D { x_range: [0.0, width_px].into(), y_range: [-super::camera::STRIP_PX, height_px].into() };
+    let strip = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
+    let view = View::new("2D", title, format!("{}{}", film.root, super::camera::ENTITY));
+    Some(view.with("VisualBounds2D", VisualBounds2D::new(bounds)).with("Background", strip).into())
 }
 
 /// Returns the 3D view of a film, which moves along the road with the ego.
@@ -179,10 +196,10 @@ fn bird(films: &[FilmContents]) -> Option<Node> {
     let shown: Vec<&FilmContents> = films.iter().filter(|film| film.has_scene).collect();
     let low = shown.iter().map(|film| film.bird_range[0]).min_by(f64::total_cmp)?;
     let high = shown.iter().map(|film| film.bird_range[1]).max_by(f64::total_cmp)?;
-    let subject = if is_traffic(films) { "vehicle that changes lanes" } else { "ego" };
-    let outlines = if shown.len() > 1 { " · outlines: the other arm" } else { "" };
-    let view = View::new("2D", format!("From above · distance from the {subject} [m]{outlines}"), "/")
-        .with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
+    let subject = if is_traffic(films) { "vehicle that changes lanes" } else { "E" };
+    let outlines = if shown.len() > 1 { " · outlines: other arm" } else { "" };
+    let title = format!("From above [m from {subject} blue] · F orange · R pink · tracks cyan{outlines}");
+    let view = View::new("2D", title, "/").with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
     let bounds = Range2D { x_range: super::bird::X_RANGE_M.into(), y_range: [low, high].into() };
     let road = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
     Some(view.with("VisualBounds2D", VisualBounds2D::new(bounds)).with("Background", road).into())
@@ -247,4 +264,23 @@ fn states() -> Node {
 /// Returns the title of a view, followed by the name of its arm if there are several films.
 fn titled(title: &str, films: &[FilmContents], film: &FilmContents) -> String {
     if films.len() < 2 { title.to_owned() } else { format!("{title}: {}", film.name) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_has_the_room_of_its_lines_and_not_more() {
+        let height_px = |told: &str| {
+            let share = verdict_share(told, 8.0);
+            WINDOW_PX * share / (share + 8.0)
+        };
+        let two = "**COLLISION**\n\n- **with MIS: R struck E**\n";
+        assert!((height_px(two) - (AROUND_LINES_PX + 3.0 * LINE_PX)).abs() < 0.01);
+        let long = format!("{two}- **{}**\n", "x".repeat(2 * LINE_LETTERS + 1));
+        assert!((height_px(&long) - height_px(two) - 3.0 * LINE_PX).abs() < 0.01);
+        assert!(height_px(&long.repeat(50)) <= MOST_OF_COLUMN * WINDOW_PX + 0.01, "the other views keep their room");
+        assert!(verdict_share(two, 0.0) > 0.0, "a verdict alone");
+    }
 }

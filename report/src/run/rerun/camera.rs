@@ -14,7 +14,7 @@ use closecall_sensors::camera::{
 };
 use closecall_sensors::rear_exposures;
 use closecall_traffic::{Time, VehicleClass, maths};
-use rerun::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
+use rerun::{AsComponents, Boxes2D, Image, Pinhole, Points2D, Transform3D};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
@@ -68,6 +68,14 @@ impl Shown {
     }
 }
 
+impl Shown {
+    /// Returns the size of the picture: columns and rows (px).
+    fn size_px(&self) -> [f64; 2] {
+        let step_px = f64::from(self.step_px);
+        [f64::from(self.image.width_px) / step_px, f64::from(self.rows_px.end - self.rows_px.start) / step_px]
+    }
+}
+
 /// Writes position and projection of the camera, so that the scene shows its image where it is
 /// taken. The pitch of the body is left out.
 fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
@@ -98,13 +106,15 @@ fn axes(camera: &Camera) -> [[f64; 3]; 3] {
     ]
 }
 
-/// Writes the images. Returns true if there are any.
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingError> {
-    let Some((camera, key)) = &film.camera else { return Ok(false) };
+/// Writes the images. Returns the size of the shown pictures (px), or `None` if there are none.
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Option<[f64; 2]>, RecordingError> {
+    let Some((camera, key)) = &film.camera else { return Ok(None) };
     write_pinhole(writer, film, camera)?;
     let camera = RearCamera::new(*camera);
     let is_whole = camera.camera().pipeline == Pipeline::MaskRcnn;
+    let part = Shown::of(camera.camera().resolution);
     let windows_entity = format!("{ENTITY}/windows");
+    writer.write_static(LABELS_ENTITY, &fixed_labels())?;
     if is_whole {
         instances::write_fixed(writer)?;
     } else {
@@ -122,21 +132,49 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingE
     let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
     writer.write_each(ENTITY, &images)?;
     if is_whole {
-        instances::write(writer, &Shown::of(camera.camera().resolution), shown.iter().map(|row| &film.frames[*row]))?;
+        instances::write(writer, &part, shown.iter().map(|row| &film.frames[*row]))?;
     } else {
         marks.extend(shown.iter().map(|row| {
             let frame = &film.frames[*row];
             (frame.time, windows::windows(film, &camera, frame))
         }));
-        let marks: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, boxes)| (*time, boxes as _)).collect();
-        writer.write_each(&windows_entity, &marks)?;
+        let boxes: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, marks)| (*time, &marks.0 as _)).collect();
+        writer.write_each(&windows_entity, &boxes)?;
+        let labels: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, marks)| (*time, &marks.1 as _)).collect();
+        writer.write_each(LABELS_ENTITY, &labels)?;
     }
-    Ok(!images.is_empty())
+    Ok((!images.is_empty()).then(|| part.size_px()))
 }
 
-/// Returns what all boxes in the image have in common.
+/// Returns what all boxes in the image have in common. Their own labels would be broken at the width of
+/// a narrow box, and leave the picture below a near vehicle.
 fn fixed_marks() -> Boxes2D {
-    Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true)
+    Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(false)
+}
+
+/// Returns what the labels of all boxes have in common.
+fn fixed_labels() -> Points2D {
+    Points2D::update_fields().with_colors([palette::LABEL]).with_radii([0.05_f32]).with_show_labels(true)
+}
+
+/// Returns the labels of boxes in the strip above the picture, each over the middle of its box. An empty
+/// label is left out.
+fn labels_in_strip(boxes: &[([f32; 2], [f32; 2])], labels: &[String], width_px: f64) -> Points2D {
+    let shown = || boxes.iter().zip(labels).filter(|(_, label)| !label.is_empty());
+    Points2D::update_fields()
+        .with_positions(shown().map(|(place, label)| [label_middle(place, label, width_px), -STRIP_PX as f32]))
+        .with_labels(shown().map(|(_, label)| label.as_str()))
+}
+
+/// Returns the middle of the label of a box along the strip: it does not leave the picture.
+fn label_middle(([left, _], [width, _]): &([f32; 2], [f32; 2]), label: &str, width_px: f64) -> f32 {
+    let half = 0.5 * label_px(label);
+    (left + 0.5 * width).min(width_px as f32 - half).max(half)
+}
+
+/// Returns the width of a label in the strip (px of the picture).
+fn label_px(label: &str) -> f32 {
+    LETTER_PX * label.chars().count() as f32 + BETWEEN_LABELS_PX
 }
 
 /// Returns the row of the frame that the image taken in a row shows: an earlier one if the camera
@@ -200,25 +238,26 @@ fn in_picture(shown: &Shown, [left, top, right, bottom]: [f32; 4]) -> ([f32; 2],
     (low, [0, 1].map(|axis| high[axis] - low[axis]))
 }
 
-/// Width of a letter and height of a label in the picture, where the camera has the room of a
-/// window of 1280 px (px).
+/// Entity of the labels of the boxes.
+const LABELS_ENTITY: &str = "world/ego/camera/labels";
+/// Height of the strip above the picture in which the labels of the boxes lie (px of the picture): a
+/// label in a window of 1280 x 720 px. On the strip, which is black, labels are legible.
+pub(super) const STRIP_PX: f64 = 16.0;
+/// Width of a letter of a label, and of the box of a label with the room to the next one, there (px of
+/// the picture).
 const LETTER_PX: f32 = 3.4;
-const LABEL_PX: f32 = 9.0;
+const BETWEEN_LABELS_PX: f32 = 10.0;
 
-/// Clears each label that would lie on one of a larger box. A label is centred below its box.
-fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String]) {
+/// Clears each label that would lie on one of a larger box in the strip above a picture of this width.
+fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String], width_px: f64) {
     let area = |index: usize| boxes[index].1[0] * boxes[index].1[1];
     let mut order: Vec<usize> = (0..boxes.len().min(labels.len())).collect();
     order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
-    let mut taken: Vec<[f32; 4]> = Vec::new();
+    let mut taken: Vec<[f32; 2]> = Vec::new();
     for index in order {
-        let ([left, top], [width, height]) = boxes[index];
-        let half = 0.5 * LETTER_PX * labels[index].chars().count() as f32;
-        let (middle, below) = (left + 0.5 * width, top + height);
-        let place = [middle - half, below, middle + half, below + LABEL_PX];
-        let covers = |[left, top, right, bottom]: &[f32; 4]| {
-            place[0] < *right && *left < place[2] && place[1] < *bottom && *top < place[3]
-        };
+        let (middle, half) = (label_middle(&boxes[index], &labels[index], width_px), 0.5 * label_px(&labels[index]));
+        let place = [middle - half, middle + half];
+        let covers = |[left, right]: &[f32; 2]| place[0] < *right && *left < place[1];
         if labels[index].is_empty() || taken.iter().any(covers) {
             labels[index].clear();
         } else {
@@ -294,10 +333,20 @@ mod tests {
     }
 
     #[test]
+    fn the_label_of_a_box_at_the_edge_stays_above_the_picture() {
+        let label = "motorcycle 0.83";
+        for left in [-3.0, 0.0, 100.0, 250.0] {
+            let middle = label_middle(&([left, 40.0], [6.0, 36.0]), label, 256.0);
+            assert!(middle - 0.5 * label_px(label) >= 0.0 && middle + 0.5 * label_px(label) <= 256.0, "{middle}");
+        }
+        assert!((label_middle(&([100.0, 40.0], [6.0, 36.0]), label, 256.0) - 103.0).abs() < 1e-6, "above its box");
+    }
+
+    #[test]
     fn no_label_lies_on_that_of_a_larger_box() {
         let boxes = [([100.0, 10.0], [8.0, 20.0]), ([98.0, 10.0], [30.0, 22.0]), ([200.0, 10.0], [8.0, 8.0])];
         let mut labels = ["motorcycle 0.83", "car 1.00", "truck 0.70"].map(str::to_owned);
-        clear_covered(&boxes, &mut labels);
+        clear_covered(&boxes, &mut labels, 256.0);
         assert_eq!(labels, ["", "car 1.00", "truck 0.70"]);
     }
 }

@@ -30,13 +30,14 @@ const MOMENTS: [Rgba; 7] = [
     [104, 142, 72, 255],
     [130, 130, 140, 255],
 ];
-/// The ground beside the road in the view from above. It is dark in both themes of the viewer,
-/// which makes labels legible.
-pub(super) const GROUND: Rgba = [24, 27, 31, 255];
-/// Fog in the scene. It is darker than by day, which makes labels legible.
+/// The ground in the view from above, and around the image of a camera. The viewer puts a label on a
+/// box through which the ground shines. In the light theme the box is bright, and only white on a
+/// black ground has enough contrast.
+pub(super) const GROUND: Rgba = [0, 0, 0, 255];
+/// Fog in the scene.
 const FOG: Rgba = [118, 122, 128, 255];
-/// Text beside the road.
-pub(super) const NOTE: Rgba = [222, 226, 230, 255];
+/// Labels, on [`GROUND`].
+pub(super) const LABEL: Rgba = WHITE;
 
 pub(super) const GLASS: Rgba = [30, 36, 44, 255];
 pub(super) const TYRE: Rgba = [22, 22, 24, 255];
@@ -83,10 +84,7 @@ pub(super) const fn sky(light: Light) -> Rgba {
 
 /// Returns the colour of something on the ground in this light.
 pub(super) fn lit(colour: Rgba, light: Light) -> Rgba {
-    let share = GROUND_LIGHT[light_index(light)];
-    let [red, green, blue, opacity] = colour;
-    let darker = |channel: u8| (f64::from(channel) * share).round() as u8;
-    [darker(red), darker(green), darker(blue), opacity]
+    scaled(colour, GROUND_LIGHT[light_index(light)])
 }
 
 const fn light_index(light: Light) -> usize {
@@ -110,13 +108,6 @@ pub(super) fn with_opacity([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
     [red, green, blue, opacity]
 }
 
-/// Returns a paler shade of a colour, for text. The viewer puts text on a box that is dark in its
-/// dark theme, and grey in its light theme.
-pub(super) fn text([red, green, blue, opacity]: Rgba) -> Rgba {
-    let paler = |channel: u8| 255 - (u16::from(255 - channel) * 3 / 10) as u8;
-    [paler(red), paler(green), paler(blue), opacity]
-}
-
 /// Share of white in a curve of the baseline.
 const BASELINE_WHITE: f64 = 0.20;
 
@@ -130,6 +121,62 @@ pub(super) fn lighter([red, green, blue, opacity]: Rgba) -> Rgba {
 pub(super) fn moment(moment: Moment) -> Rgba {
     let index = Moment::ALL.iter().position(|other| *other == moment).unwrap_or(0);
     MOMENTS[index % MOMENTS.len()]
+}
+
+/// What follows an action of the ego stack, in a bar of states. It differs from the grey of a stack
+/// that does nothing.
+pub(super) const AFTERWARDS: Rgba = [64, 80, 124, 255];
+
+/// White, in which the viewer writes on bars of states in both themes.
+const WHITE: Rgba = [255, 255, 255, 255];
+/// Opacity with which the viewer draws a bar of states (Rerun 0.36). The rest of the light is the
+/// background of its theme.
+const BAR_OPACITY: f64 = 0.784;
+/// Least contrast of text (WCAG 2.2, 1.4.3).
+const LEAST_OF_TEXT: f64 = 4.5;
+/// Share by which a bar becomes darker in one step.
+const DARKER_STEP: f64 = 0.02;
+
+/// Returns a shade of a colour, for a bar of states: as dark as it must be for the white text on it
+/// in the light theme.
+pub(super) fn bar(colour: Rgba) -> Rgba {
+    let mut share = 1.0;
+    loop {
+        let shade = scaled(colour, share);
+        if share <= 0.0 || contrast(shown_bar(shade, WHITE), WHITE) >= LEAST_OF_TEXT {
+            return shade;
+        }
+        share -= DARKER_STEP;
+    }
+}
+
+/// Returns a colour with each channel multiplied by `share`.
+fn scaled([red, green, blue, opacity]: Rgba, share: f64) -> Rgba {
+    let darker = |channel: u8| (f64::from(channel) * share).round() as u8;
+    [darker(red), darker(green), darker(blue), opacity]
+}
+
+/// Returns the colour that the viewer shows of a bar in a theme with this background.
+fn shown_bar(bar: Rgba, background: Rgba) -> Rgba {
+    std::array::from_fn(|channel| {
+        let [bar, background] = [bar, background].map(|colour| f64::from(colour[channel]));
+        (BAR_OPACITY * bar + (1.0 - BAR_OPACITY) * background).round() as u8
+    })
+}
+
+/// Returns the relative luminance of a colour after WCAG 2.2.
+fn luminance([red, green, blue, _]: Rgba) -> f64 {
+    let linear = |channel: u8| match f64::from(channel) / 255.0 {
+        low if low <= 0.040_45 => low / 12.92,
+        high => closecall_traffic::maths::powf((high + 0.055) / 1.055, 2.4),
+    };
+    0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
+}
+
+/// Returns the contrast of two colours after WCAG 2.2, 1 to 21.
+fn contrast(first: Rgba, second: Rgba) -> f64 {
+    let [first, second] = [first, second].map(luminance);
+    (first.max(second) + 0.05) / (first.min(second) + 0.05)
 }
 
 /// Returns the colour of a cluster of a scan.
@@ -165,23 +212,8 @@ mod tests {
     /// Backgrounds of the plots in the viewer's dark theme and in its light theme (Rerun 0.36).
     const DARK: Rgba = [13, 16, 17, 255];
     const LIGHT: Rgba = [255, 255, 255, 255];
-    /// Least contrast of a graphical object (WCAG 2.2, 1.4.11) and of text (1.4.3).
+    /// Least contrast of a graphical object (WCAG 2.2, 1.4.11).
     const LEAST_OF_CURVES: f64 = 3.0;
-    const LEAST_OF_TEXT: f64 = 4.5;
-
-    /// Returns the relative luminance after WCAG 2.2.
-    fn luminance([red, green, blue, _]: Rgba) -> f64 {
-        let linear = |channel: u8| match f64::from(channel) / 255.0 {
-            low if low <= 0.040_45 => low / 12.92,
-            high => closecall_traffic::maths::powf((high + 0.055) / 1.055, 2.4),
-        };
-        0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue)
-    }
-
-    fn contrast(first: Rgba, second: Rgba) -> f64 {
-        let [first, second] = [first, second].map(luminance);
-        (first.max(second) + 0.05) / (first.min(second) + 0.05)
-    }
 
     #[test]
     fn curves_are_legible_in_both_themes_and_those_of_the_baseline_are_lighter() {
@@ -200,11 +232,35 @@ mod tests {
     }
 
     #[test]
-    fn labels_are_legible_on_the_ground_of_the_view_from_above() {
-        for part in [Part::Ego, Part::Lead, Part::Rear, Part::Other(0), Part::Background] {
-            let contrast = contrast(text(super::part(part)), GROUND);
-            assert!(contrast >= LEAST_OF_TEXT, "{part:?}: {contrast:.2}");
+    fn the_text_on_a_bar_of_states_is_legible_in_both_themes() {
+        let bars = [EGO, FRONT, REAR, CRITICAL, SAFE, WARNING, NEUTRAL, QUIET, AFTERWARDS];
+        for colour in bars.into_iter().chain(MOMENTS) {
+            for background in [DARK, LIGHT] {
+                let contrast = contrast(shown_bar(bar(colour), background), WHITE);
+                assert!(contrast >= LEAST_OF_TEXT, "{colour:?} on {background:?}: {contrast:.2}");
+            }
         }
-        assert!(contrast(NOTE, GROUND) >= LEAST_OF_TEXT);
+        assert!(contrast(shown_bar(EGO, LIGHT), WHITE) < LEAST_OF_TEXT, "a bar that does not pass");
+        assert_eq!(bar(WHITE)[3], 255, "a bar stays opaque");
+        assert_ne!(bar(AFTERWARDS), bar(QUIET));
+    }
+
+    /// Fill of the box of a label in the viewer's dark and in its light theme, and its opacity (Rerun 0.36).
+    const LABEL_BOXES: [Rgba; 2] = [[44, 44, 44, 255], [224, 223, 223, 255]];
+    const LABEL_BOX_OPACITY: f64 = 0.5;
+
+    #[test]
+    fn labels_are_legible_on_their_ground_in_both_themes() {
+        let on = |ground: Rgba, fill: Rgba| -> Rgba {
+            std::array::from_fn(|channel| {
+                let [fill, ground] = [fill, ground].map(|colour| f64::from(colour[channel]));
+                (LABEL_BOX_OPACITY * fill + (1.0 - LABEL_BOX_OPACITY) * ground).round() as u8
+            })
+        };
+        for fill in LABEL_BOXES {
+            let contrast = contrast(LABEL, on(GROUND, fill));
+            assert!(contrast >= LEAST_OF_TEXT, "{fill:?}: {contrast:.2}");
+        }
+        assert!(contrast(LABEL, on([24, 27, 31, 255], LABEL_BOXES[1])) < LEAST_OF_TEXT, "a ground that does not pass");
     }
 }

@@ -24,9 +24,10 @@ use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 /// Width of a curve (UI points).
-const LINE_WIDTH: f32 = 2.0;
-/// Width of a curve that is less important (UI points).
-const THIN_LINE_WIDTH: f32 = 1.0;
+const LINE_WIDTH: f32 = 3.0;
+/// Width of a curve that is less important (UI points). The edges of a curve fade over one pixel: a
+/// narrower one has no pixel in its full colour, and too little contrast.
+const THIN_LINE_WIDTH: f32 = 2.0;
 
 /// The role of a film among the films of a recording, which share the plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,7 +75,7 @@ impl Kind {
     pub(super) const fn title(self, is_traffic: bool) -> &'static str {
         match self {
             Self::Acceleration if is_traffic => "Acceleration [m/s²] · subject blue",
-            Self::Headway => "Time headway [s] · F orange · R pink · 0.9 s red",
+            Self::Headway => "Headway [s] · ahead orange, behind pink",
             Self::Acceleration => "Acceleration [m/s²] · E blue · F orange · R pink",
             Self::Speed => "Speed [m/s]",
             Self::Gap => "Gap [m] · seen grey",
@@ -397,7 +398,16 @@ impl Plots<'_> {
 
     /// Writes the front time headway gained since the MIS first engaged, with its goal.
     fn margin(&self) -> Result<bool, RecordingError> {
-        let is_increasing = |frame: &&Frame| frame.command.is_some_and(|command| command.state == EgoState::Increasing);
+        // A pause of emergency braking is no engagement, so the summary decides.
+        let mis = self.film.outcome().and_then(|outcome| outcome.mis.as_ref().ok());
+        let from = match mis.map(|mis| mis.engaged_at_s) {
+            Some(Err(_)) => return Ok(false),
+            Some(Ok(engaged_at_s)) => Time::from_s(engaged_at_s),
+            None => Time::ZERO,
+        };
+        let is_increasing = |frame: &&Frame| {
+            frame.time >= from && frame.command.is_some_and(|command| command.state == EgoState::Increasing)
+        };
         let first = self.film.frames.iter().find(is_increasing);
         let start = first.and_then(|frame| Some((frame.time, frame.margins.thw_front_s.ok()?, plan(frame))));
         let Some((since, thw_s, planned)) = start else { return Ok(false) };

@@ -24,7 +24,22 @@ pub(super) fn verdict(films: &[Film]) -> String {
             }
         }
     }
-    page
+    strong(&page)
+}
+
+/// Returns a page with all its text in the viewer's strong colour. The usual text of its light theme
+/// has a contrast of 3.97 : 1 only.
+fn strong(page: &str) -> String {
+    let line = |line: &str| match line.split_once(' ') {
+        _ if line.is_empty() || line.starts_with('#') || line.starts_with("| ---") => line.to_owned(),
+        Some(("|", cells)) => {
+            let cells = cells.trim_end_matches('|').split(" | ").map(|cell| format!("| **{}** ", cell.trim()));
+            format!("{}|", cells.collect::<String>())
+        }
+        Some(("-", text)) => format!("- **{}**", text.replace("**", "").trim()),
+        _ => format!("**{}**", line.replace("**", "").trim()),
+    };
+    page.lines().map(|text| line(text) + "\n").collect()
 }
 
 /// Returns the story in Markdown: the events of each film, the table of each film, and the key of
@@ -41,7 +56,7 @@ pub(super) fn story(films: &[Film]) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(page, "\n{LETTERS}.");
     }
-    page
+    strong(&page)
 }
 
 /// Appends the verdict on a pair.

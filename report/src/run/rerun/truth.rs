@@ -25,7 +25,7 @@ const CLEARANCE_M: f64 = 0.05;
 const FALSE_HEIGHT_M: f64 = 1.5;
 
 /// The label of a track to which no vehicle belongs.
-const NO_VEHICLE: &str = "does not exist";
+pub(super) const NO_VEHICLE: &str = "does not exist";
 
 /// A box in the ego frame.
 #[derive(Clone, Copy)]
@@ -77,7 +77,7 @@ fn write_layer(
         Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.05_f32]).with_colors([colour]);
     // One label stands for every box.
     match label {
-        Some(label) => writer.write_static(entity, &fixed.with_labels([label]).with_show_labels(true))?,
+        Some(label) => writer.write_static(entity, &fixed.with_labels([label]).with_show_labels(false))?,
         None => writer.write_static(entity, &fixed)?,
     }
     // Rows are written for the frames with shapes and for the frame after them, which clears the
@@ -115,12 +115,20 @@ fn compare(film: &Film, frame: &Frame) -> FrameComparison {
         if is_known { comparison.detected.push(shape) } else { comparison.missed.push(shape) }
     }
     for track in tracks.iter().filter(|track| track.class.vehicle() > 0.5) {
-        let of_any = |&(actor, pose): &(usize, [f64; 3])| are_close(face_m(pose, length_m(actor)), track_face_m(track));
-        if !poses.iter().any(of_any) {
+        if !belongs_to_a_vehicle(film, frame, track) {
             comparison.false_tracks.push(track_shape(track));
         }
     }
     comparison
+}
+
+/// Returns true if any vehicle is where the track is.
+pub(super) fn belongs_to_a_vehicle(film: &Film, frame: &Frame, track: &Track) -> bool {
+    let is_there = |actor: usize| {
+        let face = face_m(film.in_ego_frame(frame, actor), film.actors[actor].vehicle.dimensions.length_m);
+        are_close(face, track_face_m(track))
+    };
+    (0..film.actors.len()).any(|actor| actor != film.ego && is_there(actor))
 }
 
 /// Returns the box of a vehicle.

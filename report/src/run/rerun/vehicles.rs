@@ -1,5 +1,10 @@
 //! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around
 //! the ego.
+//!
+//! Names, headways and texts of collisions are written, but hidden until the user switches them on. On
+//! the ground and the sky of the scene the viewer's labels are not legible in its light theme, and in a
+//! small scene they lie on each other. The title of the view from above explains the colours, and that
+//! view has all names.
 
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, PlanePose, Road, Time, VehicleClass, VehicleState, maths};
@@ -190,8 +195,7 @@ fn write_name(
     (at_m, colour): ([f32; 3], Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
-    let fixed =
-        Points3D::new([at_m]).with_colors([palette::text(colour)]).with_radii([0.05_f32]).with_show_labels(true);
+    let fixed = Points3D::new([at_m]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(false);
     writer.write_static(&entity, &fixed)?;
     // Only a change of the rounded speed gives a new row.
     let rows = changes(texts);
@@ -295,7 +299,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     for (entity, gaps) in both {
         writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]))?;
         let text_entity = format!("{entity}/headway");
-        let fixed = Points3D::update_fields().with_radii([0.03_f32]).with_show_labels(true);
+        let fixed = Points3D::update_fields().with_radii([0.03_f32]).with_show_labels(false);
         writer.write_static(&text_entity, &fixed)?;
         let lengths = |gaps: &[Option<Gap>]| gaps.iter().map(|gap| usize::from(gap.is_some())).collect::<Vec<_>>();
         writer.write_rows(entity, times, |range| {
@@ -307,7 +311,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
         writer.write_rows(&text_entity, times, |range| {
             let shown = || gaps[range.clone()].iter().flatten();
             Points3D::new(shown().map(|gap| gap.text_m))
-                .with_colors(shown().map(|gap| palette::text(gap.colour)))
+                .with_colors(shown().map(|gap| gap.colour))
                 .with_labels(shown().map(|gap| gap.text.as_str()))
                 .columns(lengths(&gaps[range.clone()]))
         })?;
@@ -366,10 +370,10 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         let entity = format!("{}/collision_{}", entity(film, index), number + 1);
         let [x, y] = at_m.map(|at_m| at_m as f32);
         let mark = Points3D::new([[x, y, 0.6], [text_x_m, 0.0, 0.0]])
-            .with_colors([palette::CRITICAL, palette::text(palette::CRITICAL)])
+            .with_colors([palette::CRITICAL])
             .with_radii([0.45_f32, 0.05])
             .with_labels([String::new(), film.mark_text(collision)])
-            .with_show_labels(true);
+            .with_show_labels(false);
         // The mark appears at the first frame at or after the contact: in earlier frames the
         // vehicles are still apart.
         let appears_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);

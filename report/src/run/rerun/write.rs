@@ -75,7 +75,8 @@ pub fn write_recording(path: &Path, films: &[Film]) -> Result<(), RecordingError
 fn record(films: &[Film]) -> Result<Recording, RecordingError> {
     let level = films.iter().map(|film| format!("{:?} {}", film.level, film.frames.len())).collect();
     let version = env!("CARGO_PKG_VERSION").to_owned();
-    let name = recording::name(&[version, level, summary::verdict(films), summary::story(films)]);
+    let (verdict, story) = (summary::verdict(films), summary::story(films));
+    let name = recording::name(&[version, level, verdict.clone(), story.clone()]);
     let recording = Recording::new(application(films), &name)?;
     let span = Film::span(films);
     let canvases = bird::Canvas::of_films(films);
@@ -94,9 +95,9 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
             ghosts::write(&writer, &canvases[index], ghosts)?;
         }
     }
-    write_texts(&recording, films)?;
+    write_texts(&recording, [("verdict", &verdict), ("summary", &story)])?;
     properties::write(&recording, films)?;
-    blueprint::write(&recording, &contents)?;
+    blueprint::write(&recording, &contents, &verdict)?;
     Ok(recording)
 }
 
@@ -151,7 +152,7 @@ fn write_film(
         radars::write(writer, film)?;
         bird::write(writer, canvas)?;
         contents.has_scene = true;
-        contents.has_camera = camera::write(writer, film)?;
+        contents.camera_px = camera::write(writer, film)?;
     }
     contents.plots = plots::write(writer, film, role)?;
     contents.has_states = film.frames.iter().any(|frame| frame.command.is_some());
@@ -161,9 +162,10 @@ fn write_film(
 }
 
 /// Writes the verdict and the story. Each has a view.
-fn write_texts(recording: &Recording, films: &[Film]) -> Result<(), RecordingError> {
-    for (entity, text) in [("verdict", summary::verdict(films)), ("summary", summary::story(films))] {
-        recording.log_static(entity.into(), &TextDocument::new(text).with_media_type(MediaType::markdown()))?;
+fn write_texts(recording: &Recording, texts: [(&str, &String); 2]) -> Result<(), RecordingError> {
+    for (entity, text) in texts {
+        let document = TextDocument::new(text.as_str()).with_media_type(MediaType::markdown());
+        recording.log_static(entity.into(), &document)?;
     }
     Ok(())
 }

@@ -1,14 +1,14 @@
-//! The names of the vehicles in the view from above, with their speeds and headways.
+//! The names of the vehicles in the view from above, with their speeds and headways, and of tracks that
+//! belong to no vehicle.
 
-use closecall_traffic::{Measured, Time};
+use closecall_traffic::{Measured, Time, Track};
 use rerun::Points2D;
 
 use super::super::RecordingError;
-use super::super::palette::{self, Rgba};
+use super::super::palette;
 use super::super::stream::Writer;
-use super::{
-    BETWEEN_LABELS_M, Canvas, LETTER_M, MARK_ORDER, NAMES_ABOVE_M, NAMES_BELOW_M, X_RANGE_M, clock_m, collision_m,
-};
+use super::super::truth::{NO_VEHICLE, belongs_to_a_vehicle};
+use super::{Canvas, MARK_ORDER, NAMES_ABOVE_M, NAMES_BELOW_M, clock_m, collision_m, is_shown_track};
 use crate::run::film::{Frame, Part, headway_text};
 
 /// Number of vehicles that are named, by their order among the actors.
@@ -19,7 +19,8 @@ struct Name {
     x_m: f64,
     is_above: bool,
     text: String,
-    colour: Rgba,
+    /// Room that the name takes, with the distance to the next (m in the picture).
+    width_m: f64,
 }
 
 /// Writes the names of the vehicles with their speeds and headways. Names of vehicles behind the
@@ -28,7 +29,11 @@ pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) ->
     let entity = "bird/names";
     let film = canvas.film;
     let rows: Vec<Vec<Name>> = (0..film.frames.len()).map(|row| names(canvas, row)).collect();
-    let fixed = Points2D::update_fields().with_radii([0.05_f32]).with_draw_order(MARK_ORDER).with_show_labels(true);
+    let fixed = Points2D::update_fields()
+        .with_colors([palette::LABEL])
+        .with_radii([0.05_f32])
+        .with_draw_order(MARK_ORDER)
+        .with_show_labels(true);
     writer.write_static(entity, &fixed)?;
     let y_m = |name: &Name| {
         if name.is_above { canvas.top_m - NAMES_ABOVE_M } else { canvas.bottom_m() + NAMES_BELOW_M }
@@ -38,7 +43,6 @@ pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) ->
         Points2D::update_fields()
             .with_positions(all().map(|name| [name.x_m as f32, y_m(name) as f32]))
             .with_labels(all().map(|name| name.text.as_str()))
-            .with_colors(all().map(|name| name.colour))
             .columns(rows[range.clone()].iter().map(Vec::len).collect::<Vec<_>>())
     })
 }
@@ -48,12 +52,16 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let film = canvas.film;
     let frame = &film.frames[row];
     let ego = &frame.states[film.ego];
+    let labelled_m = canvas.labelled_m();
     let mut named: Vec<usize> =
         (0..film.actors.len()).filter(|&actor| film.is_main(actor) && film.is_present(actor, row)).collect();
-    // Ego, lead vehicle and rear vehicle first, then the nearest others.
+    // The ego and the vehicles ahead of it and behind it first, then lead and rear vehicle, then the
+    // nearest others.
     let rank = |actor: &usize| match film.actors[*actor].part {
+        Part::Ego => -2.0,
+        _ if frame.lead() == Some(*actor) || frame.follower() == Some(*actor) => -1.0,
+        Part::Lead | Part::Rear => 0.0,
         Part::Other(_) | Part::Background => (frame.states[*actor].s_m - ego.s_m).abs(),
-        Part::Ego | Part::Lead | Part::Rear => 0.0,
     };
     named.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     named.truncate(NAMED);
@@ -62,27 +70,23 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         .filter_map(|actor| {
             let (state, label) = (&frame.states[actor], film.vehicle_label(actor));
             let x_m = state.s_m - ego.s_m;
-            let is_shown = x_m > X_RANGE_M[0] && x_m < X_RANGE_M[1];
-            let is_above =
-                film.actors[actor].part == Part::Rear || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m();
+            let is_shown = x_m > labelled_m[0] && x_m < labelled_m[1];
+            let is_above = actor != film.ego && (x_m < 0.0 || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m());
             let headway = headway_of(frame, actor);
             let text = format!("{label} {:.1} m/s{headway}", state.speed_mps);
-            is_shown.then(|| Name {
-                x_m,
-                is_above,
-                text,
-                colour: palette::text(palette::part(film.actors[actor].part)),
-            })
+            let width_m = canvas.label_m(text.chars().count());
+            is_shown.then_some(Name { x_m, is_above, text, width_m })
         })
         .collect();
+    names.extend(false_tracks(canvas, frame));
     let mut placed = Vec::new();
     for is_above in [true, false] {
         let (clock_m, mark_m) = if is_above { (clock_m(canvas), collision_m(canvas, row)) } else { (0.0, 0.0) };
-        let room_m = [X_RANGE_M[0] + clock_m, X_RANGE_M[1] - mark_m];
+        let room_m = [labelled_m[0] + clock_m, labelled_m[1] - mark_m];
         let (mut of_row, rest): (Vec<Name>, Vec<Name>) = names.into_iter().partition(|name| name.is_above == is_above);
         names = rest;
         // The names are in the order of their rank. A name without room is left out.
-        while of_row.len() > 1 && of_row.iter().map(Name::width_m).sum::<f64>() > room_m[1] - room_m[0] {
+        while of_row.len() > 1 && of_row.iter().map(|name| name.width_m).sum::<f64>() > room_m[1] - room_m[0] {
             of_row.pop();
         }
         of_row.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
@@ -90,6 +94,16 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         placed.extend(of_row);
     }
     placed
+}
+
+/// Returns a label for each confirmed rear track that belongs to no vehicle. It lies on the other side of
+/// the road than the names of the vehicles behind.
+fn false_tracks(canvas: &Canvas<'_>, frame: &Frame) -> Vec<Name> {
+    let (labelled_m, width_m) = (canvas.labelled_m(), canvas.label_m(NO_VEHICLE.chars().count()));
+    let is_false = |track: &&Track| is_shown_track(track) && !belongs_to_a_vehicle(canvas.film, frame, track);
+    let positions = frame.tracks.iter().filter(is_false).map(Track::x_m);
+    let shown = positions.filter(|x_m| *x_m > labelled_m[0] && *x_m < labelled_m[1]);
+    shown.map(|x_m| Name { x_m, is_above: false, text: NO_VEHICLE.to_owned(), width_m }).collect()
 }
 
 /// Returns the headway that belongs to a vehicle, as it follows its speed.
@@ -111,22 +125,15 @@ fn headway_of(frame: &Frame, actor: usize) -> String {
 fn keep_apart([from_m, to_m]: [f64; 2], names: &mut [Name]) {
     let mut free_from_m = from_m;
     for name in names.iter_mut() {
-        let half_m = 0.5 * name.width_m();
+        let half_m = 0.5 * name.width_m;
         name.x_m = name.x_m.max(free_from_m + half_m);
         free_from_m = name.x_m + half_m;
     }
     let mut free_to_m = to_m;
     for name in names.iter_mut().rev() {
-        let half_m = 0.5 * name.width_m();
+        let half_m = 0.5 * name.width_m;
         name.x_m = name.x_m.min(free_to_m - half_m);
         free_to_m = name.x_m - half_m;
-    }
-}
-
-impl Name {
-    /// Returns the room that the name takes, with the distance to the next (m in the picture).
-    fn width_m(&self) -> f64 {
-        LETTER_M * self.text.chars().count() as f64 + BETWEEN_LABELS_M
     }
 }
 
@@ -136,7 +143,8 @@ mod tests {
 
     #[test]
     fn no_name_covers_another_and_none_leaves_its_room() {
-        let name = |x_m, text: &str| Name { x_m, is_above: true, text: text.to_owned(), colour: palette::NOTE };
+        let width_m = |text: &str| 1.2 * text.chars().count() as f64 + 2.0;
+        let name = |x_m, text: &str| Name { x_m, is_above: true, text: text.to_owned(), width_m: width_m(text) };
         for at_m in [[-34.0, -33.0, -30.0], [70.0, 72.0, 74.0], [0.0, 1.0, 74.0]] {
             let mut names: Vec<Name> = at_m
                 .into_iter()
@@ -145,7 +153,7 @@ mod tests {
                 .collect();
             keep_apart([-20.0, 60.0], &mut names);
             let ends: Vec<[f64; 2]> =
-                names.iter().map(|name| [-0.5, 0.5].map(|side| name.x_m + side * name.width_m())).collect();
+                names.iter().map(|name| [-0.5, 0.5].map(|side| name.x_m + side * name.width_m)).collect();
             assert!(ends[0][0] >= -20.0 - 1e-9 && ends[2][1] <= 60.0 + 1e-9, "{ends:?}");
             assert!(ends.windows(2).all(|pair| pair[0][1] <= pair[1][0] + 1e-9), "{ends:?}");
         }

@@ -3,13 +3,13 @@
 use closecall_sensors::camera::{Instance, MASK_THRESHOLD};
 use closecall_traffic::{Time, VehicleClass};
 
-use super::{ENTITY, Shown, class_colour, clear_covered, fixed_marks, in_picture};
+use super::{ENTITY, LABELS_ENTITY, Shown, class_colour, clear_covered, fixed_marks, in_picture, labels_in_strip};
 use crate::run::film::Frame;
 use crate::run::rerun::RecordingError;
 use crate::run::rerun::palette::{self, Rgba};
 use crate::run::rerun::stream::Writer;
 use rerun::datatypes::ImageFormat;
-use rerun::{AnnotationContext, AsComponents, Boxes2D, ChannelDatatype, Rgba32, SegmentationImage};
+use rerun::{AnnotationContext, AsComponents, Boxes2D, ChannelDatatype, Points2D, Rgba32, SegmentationImage};
 
 /// Score from which an instance is more likely right than not: it has the colour of its class, and
 /// its mask is shown.
@@ -44,10 +44,13 @@ pub(super) fn write<'a>(
 ) -> Result<(), RecordingError> {
     let images: Vec<(Time, &[Instance])> =
         frames.filter_map(|frame| frame.rear_image.as_ref().map(|image| (frame.time, &image.instances[..]))).collect();
-    let boxes: Vec<(Time, Boxes2D)> = images.iter().map(|(time, instances)| (*time, boxes(part, instances))).collect();
+    let marks = images.iter().map(|(time, instances)| (*time, boxes(part, instances)));
+    let (boxes, labels): (Vec<(Time, Boxes2D)>, Vec<(Time, Points2D)>) =
+        marks.map(|(time, (boxes, labels))| ((time, boxes), (time, labels))).unzip();
     let masks: Vec<(Time, SegmentationImage)> =
         images.iter().map(|(time, instances)| (*time, masks(part, instances))).collect();
     writer.write_each(&boxes_entity(), &rows(&boxes))?;
+    writer.write_each(LABELS_ENTITY, &rows(&labels))?;
     writer.write_each(&masks_entity(), &rows(&masks))
 }
 
@@ -55,8 +58,8 @@ fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> 
     whats.iter().map(|(time, archetype)| (*time, archetype as _)).collect()
 }
 
-/// Returns the boxes of the instances with class and score, cut to the shown picture.
-fn boxes(part: &Shown, instances: &[Instance]) -> Boxes2D {
+/// Returns the boxes of the instances with class and score, cut to the shown picture, and their labels.
+fn boxes(part: &Shown, instances: &[Instance]) -> (Boxes2D, Points2D) {
     let ends = |instance: &Instance| in_picture(part, instance.box_px.map(|side| side as f32));
     let is_shown = |instance: &&Instance| ends(instance).1.iter().all(|side| *side > 0.0);
     let shown: Vec<&Instance> = instances.iter().filter(is_shown).collect();
@@ -66,11 +69,14 @@ fn boxes(part: &Shown, instances: &[Instance]) -> Boxes2D {
     };
     let places: Vec<([f32; 2], [f32; 2])> = shown.iter().map(|instance| ends(instance)).collect();
     let mut labels: Vec<String> = shown.iter().map(|instance| label(instance)).collect();
-    clear_covered(&places, &mut labels);
-    Boxes2D::from_mins_and_sizes(places.iter().map(|place| place.0), places.iter().map(|place| place.1))
+    let width_px = part.size_px()[0];
+    clear_covered(&places, &mut labels, width_px);
+    let points = labels_in_strip(&places, &labels, width_px);
+    let boxes = Boxes2D::from_mins_and_sizes(places.iter().map(|place| place.0), places.iter().map(|place| place.1))
         .with_colors(shown.iter().map(colour))
         .with_labels(labels)
-        .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))))
+        .with_class_ids(shown.iter().map(|instance| u16::from(mask_class(instance.class))));
+    (boxes, points)
 }
 
 /// Returns class and score. An instance that is probably no vehicle has no label, so the image

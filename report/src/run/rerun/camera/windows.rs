@@ -4,13 +4,13 @@
 use closecall_sensors::Detection;
 use closecall_sensors::camera::{PixelRect, RearCamera};
 
-use super::{Shown, class_colour, clear_covered, in_picture};
+use super::{Shown, class_colour, clear_covered, in_picture, labels_in_strip};
 use crate::run::film::{Film, Frame};
 use crate::run::rerun::palette::{self, Rgba};
-use rerun::Boxes2D;
+use rerun::{Boxes2D, Points2D};
 
-/// Returns the windows of the detections of a frame with their classes.
-pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {
+/// Returns the windows of the detections of a frame with their classes, and their labels.
+pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> (Boxes2D, Points2D) {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
@@ -22,10 +22,13 @@ pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2
     };
     let shown: Vec<([f32; 2], [f32; 2])> = in_image.iter().map(|(_, window)| ends(window)).collect();
     let mut labels: Vec<String> = in_image.iter().map(|(detection, _)| label(detection)).collect();
-    clear_covered(&shown, &mut labels);
-    Boxes2D::from_mins_and_sizes(shown.iter().map(|ends| ends.0), shown.iter().map(|ends| ends.1))
+    let width_px = part.size_px()[0];
+    clear_covered(&shown, &mut labels, width_px);
+    let points = labels_in_strip(&shown, &labels, width_px);
+    let boxes = Boxes2D::from_mins_and_sizes(shown.iter().map(|ends| ends.0), shown.iter().map(|ends| ends.1))
         .with_colors(in_image.iter().map(|(detection, _)| colour(detection)))
-        .with_labels(labels)
+        .with_labels(labels);
+    (boxes, points)
 }
 
 fn colour(detection: &Detection) -> Rgba {

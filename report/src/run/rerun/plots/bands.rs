@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 
 use closecall_controllers::EgoState;
-use closecall_scenarios::outcome::{Phase, ReachedMoment};
+use closecall_scenarios::outcome::{Moment, Phase, ReachedMoment};
 use closecall_sensors::Health;
 use closecall_sensors::faults::{SensorGroup, StatedFault};
 use closecall_sensors::monitors::Alarms;
@@ -39,23 +39,31 @@ const PADDING_LETTERS: f64 = 1.5;
 #[derive(Clone, Copy)]
 struct Word<'a> {
     text: &'a str,
-    /// The text of a bar that is too short for the whole text.
-    short: &'a str,
+    /// The texts of a bar that is too short for the whole text, and of one that is too short for the
+    /// first of them.
+    shorts: [&'a str; 2],
     colour: Rgba,
 }
 
 impl<'a> Word<'a> {
     const fn new(text: &'a str, short: &'a str, colour: Rgba) -> Self {
-        Self { text, short, colour }
+        Self { text, shorts: [short, short], colour }
+    }
+
+    /// Returns the state with a text for a bar that is too short for its other texts.
+    const fn with_shortest(self, shortest: &'a str) -> Self {
+        Self { shorts: [self.shorts[0], shortest], ..self }
     }
 
     /// Returns the state and the label of a bar with room for this many letters. A bar too short
     /// for the text has a separate state, since the viewer has one label per state.
     fn fitted(&self, letters: f64) -> (String, &'a str) {
         let fits = |label: &str| label.chars().count() as f64 <= letters;
-        match [self.text, self.short].into_iter().position(fits) {
+        let [short, shortest] = self.shorts;
+        match [self.text, short, shortest].into_iter().position(fits) {
             Some(0) => (self.text.to_owned(), self.text),
-            Some(_) => (format!("{} (briefly)", self.text), self.short),
+            Some(1) => (format!("{} (briefly)", self.text), short),
+            Some(_) => (format!("{} (very briefly)", self.text), shortest),
             None => (format!("{} (for a moment)", self.text), NO_LABEL),
         }
     }
@@ -115,7 +123,7 @@ const STATES: [Word<'static>; 5] = [
     Word::new(ego_state_name(EgoState::Following), "follow", palette::QUIET),
     Word::new(ego_state_name(EgoState::Increasing), "MIS", palette::EGO),
     Word::new(ego_state_name(EgoState::Holding), "hold", palette::SAFE),
-    Word::new(ego_state_name(EgoState::Releasing), "rel.", palette::NEUTRAL),
+    Word::new(ego_state_name(EgoState::Releasing), "rel.", palette::AFTERWARDS),
     Word::new(ego_state_name(EgoState::EmergencyBraking), "AEB", palette::CRITICAL),
 ];
 
@@ -124,7 +132,7 @@ const PHASES: [Word<'static>; 5] = [
     Word::new(phase_name(Phase::Approach), "app.", palette::QUIET),
     Word::new(phase_name(Phase::Critical), "crit.", palette::CRITICAL),
     Word::new(phase_name(Phase::Overtaking), "overt.", palette::WARNING),
-    Word::new(phase_name(Phase::After), "after", palette::NEUTRAL),
+    Word::new(phase_name(Phase::After), "after", palette::AFTERWARDS),
 ];
 
 /// Returns the name of a phase of the encounter.
@@ -151,6 +159,23 @@ fn first_word(text: &str) -> &str {
     }
 }
 
+/// Returns the text of a very short bar of the health of sensors.
+fn shortest_health(text: &str) -> &'static str {
+    match text {
+        HEALTHY => "ok",
+        text if text.starts_with(DEGRADED) => "deg",
+        text if text.starts_with(FAILED) => "out",
+        _ => "!",
+    }
+}
+
+/// Returns the name of an arm as the last part of the path of a row. The viewer shows the path, and
+/// writes a backslash before every other character.
+fn row_name(arm: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || matches!(letter, '-' | '.' | '_');
+    arm.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect()
+}
+
 impl Plots<'_> {
     /// Writes the bands. A band ends with the run.
     pub(super) fn bands(&self) -> Result<(), RecordingError> {
@@ -174,7 +199,7 @@ impl Plots<'_> {
             let braking = frames.iter().map(|frame| frame.states[index].brake_light);
             let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
             if words.contains(&BRAKES) {
-                self.band(&format!("9_brake_light_{}", actor.name), &words, &BRAKING)?;
+                self.band(&format!("9_brake_light_{}", row_name(&actor.name)), &words, &BRAKING)?;
             }
         }
         Ok(())
@@ -200,26 +225,30 @@ impl Plots<'_> {
         self.band("2_reason", &words, &states)
     }
 
-    /// Writes a band that shows from when on vehicles have collided, and which.
+    /// Writes a band that shows from when on vehicles have collided, and which. The bars of collisions
+    /// that follow each other are short, so the bar before the first one names them all.
     fn collisions(&self) -> Result<(), RecordingError> {
         let collisions = self.film.collisions();
+        let Some(sentence) = self.film.sentence().filter(|_| !collisions.is_empty()) else { return Ok(()) };
         let texts: Vec<String> = collisions.iter().map(|collision| self.film.struck_text(collision)).collect();
-        if texts.is_empty() {
-            return Ok(());
-        }
         let latest = |time: Time| collisions.iter().rposition(|collision| collision.time <= time);
-        let words: Vec<&str> =
-            self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
-        // A short bar has the letters of the two vehicles only.
-        let letters =
-            |text: &String| text.split(' ').filter(|word| *word != "struck").take(2).collect::<Vec<_>>().join(" → ");
-        let shorts: Vec<String> = texts.iter().map(letters).collect();
-        let states = texts.iter().zip(&shorts).map(|(text, short)| Word::new(text, short, palette::CRITICAL));
-        self.band(
-            "4_collisions",
-            &words,
-            &states.chain([Word::new(BEFORE, BEFORE, palette::QUIET)]).collect::<Vec<_>>(),
-        )
+        let arrows: Vec<String> =
+            collisions.iter().map(|collision| sentence.who(collision).replace(" struck ", " → ")).collect();
+        // The bar from each collision on names the collisions until then.
+        let until: Vec<String> = (0..texts.len()).map(|last| texts[..=last].join(", then ")).collect();
+        let arrows_until: Vec<String> = (0..texts.len()).map(|last| arrows[..=last].join(", then ")).collect();
+        let at = collisions.iter().zip(&arrows).map(|(collision, who)| format!("{who} at {:.1} s", collision.time.s()));
+        let before = format!("none until {}", at.collect::<Vec<_>>().join(", then "));
+        let words: Vec<&str> = self
+            .times
+            .iter()
+            .map(|&time| latest(time).map_or(before.as_str(), |index| until[index].as_str()))
+            .collect();
+        let states = (0..texts.len()).map(|index| {
+            Word::new(&until[index], &arrows_until[index], palette::CRITICAL).with_shortest(&arrows[index])
+        });
+        let none = Word::new(&before, &arrows_until[arrows_until.len() - 1], palette::QUIET).with_shortest(BEFORE);
+        self.band("4_collisions", &words, &states.chain([none]).collect::<Vec<_>>())
     }
 
     /// Writes a band for each group of sensors that exists: its health as the ego knows it, with the
@@ -256,7 +285,10 @@ impl Plots<'_> {
             };
             let states: Vec<Word<'_>> = changes(&words)
                 .into_iter()
-                .map(|row| Word::new(words[row], first_word(words[row]), colour(words[row])))
+                .map(|row| {
+                    Word::new(words[row], first_word(words[row]), colour(words[row]))
+                        .with_shortest(shortest_health(words[row]))
+                })
                 .collect();
             self.band(row, &words, &states)?;
         }
@@ -284,8 +316,11 @@ impl Plots<'_> {
             return Ok(());
         }
         let texts: Vec<String> = moments.iter().map(|noted| self.film.letters.moment_label(noted)).collect();
-        let short =
-            |noted: &ReachedMoment| noted.moment.letter().map_or("·".to_owned(), |letter| format!("({letter})"));
+        let short = |noted: &ReachedMoment| match (noted.moment.letter(), noted.moment) {
+            (Some(letter), _) => format!("({letter})"),
+            (None, Moment::Concluded) => "past".to_owned(),
+            (None, _) => "left".to_owned(),
+        };
         let short: Vec<String> = moments.iter().map(short).collect();
         let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
         let words: Vec<&str> =
@@ -299,7 +334,7 @@ impl Plots<'_> {
     /// Writes a band with one state per frame, and its end after the last frame. A bar shows as
     /// much of the state's name as fits.
     fn band(&self, row: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
-        let entity = format!("{ENTITY}/{row}/{}", self.film.arm_label().replace(' ', "_"));
+        let entity = format!("{ENTITY}/{row}/{}", row_name(self.film.arm_label()));
         let rows = changes(words);
         let end = self.film.end() + self.film.period;
         let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).chain([end]).collect();
@@ -316,7 +351,7 @@ impl Plots<'_> {
         let configuration = StateConfiguration::new()
             .with_values(bars.keys().map(String::as_str))
             .with_labels(bars.values().map(|(label, _)| *label))
-            .with_colors(bars.values().map(|(_, colour)| *colour));
+            .with_colors(bars.values().map(|(_, colour)| palette::bar(*colour)));
         self.writer.write_static_of_all(&entity, &configuration)?;
         self.writer.write_curve_of_all(&entity, &times, |range| {
             StateChange::new().with_state(shown[range].iter().map(String::as_str)).columns_of_unit_batches()
@@ -334,5 +369,16 @@ mod tests {
         assert_eq!(state.fitted(19.0), ("increasing the margin (briefly)".to_owned(), "MIS"));
         assert_eq!(state.fitted(21.0), ("increasing the margin".to_owned(), "increasing the margin"));
         assert_eq!(state.fitted(2.9), ("increasing the margin (for a moment)".to_owned(), NO_LABEL));
+        let state = Word::new("degraded, as too few returns", "degraded", palette::WARNING).with_shortest("deg");
+        assert_eq!(state.fitted(4.0), ("degraded, as too few returns (very briefly)".to_owned(), "deg"));
+        assert_eq!(state.fitted(8.0).1, "degraded");
+    }
+
+    #[test]
+    fn a_row_name_has_no_character_that_the_viewer_escapes() {
+        assert_eq!(row_name("with MIS"), "with_MIS");
+        assert_eq!(row_name("acc+aeb"), "acc_aeb");
+        assert_eq!(row_name("gap-1.6"), "gap-1.6");
+        assert_eq!(row_name("lib:own/é.so"), "lib_own_é.so");
     }
 }

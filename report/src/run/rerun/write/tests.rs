@@ -166,7 +166,7 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
     }
     let verdict = summary::verdict(&films);
-    assert!(verdict.starts_with("### Recorded, and with MIS") && verdict.contains("- **recorded:** "), "{verdict}");
+    assert!(verdict.starts_with("**Recorded, and with MIS**") && verdict.contains("- **recorded: "), "{verdict}");
 }
 
 #[test]
@@ -409,6 +409,35 @@ fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
 }
 
 #[test]
+fn each_of_two_collisions_is_readable_in_the_row_of_states() {
+    let mut film = filmed("paper-figure", ControllerChoice::ACC, (None, Level::Events));
+    let first = film.worst_collision().unwrap().clone();
+    let lead =
+        library("paper-figure").config().actors.iter().map(|actor| actor.id.clone()).find(|id| !first.involves(id));
+    let ego = film.outcome().unwrap().ego.clone();
+    let second = Collision {
+        time: first.time + Time::from_ms(640),
+        between: [ego, lead.unwrap()],
+        struck_side: [BoxSide::Front, BoxSide::Rear],
+        closed_by: ClosedBy::First,
+        ..first.clone()
+    };
+    let expected = format!("none until R → E at {:.1} s, then E → F at {:.1} s", first.time.s(), second.time.s());
+    film.outcome.as_mut().unwrap().collisions = vec![first, second];
+    let data = chunks(&[film], StoreKind::Recording);
+    let of = |component: &str| -> Vec<String> {
+        let row = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/4_collisions/without_MIS");
+        row.flat_map(|chunk| texts(chunk, component)).collect()
+    };
+    let (labels, values) = (of("StateConfiguration:labels"), of("StateConfiguration:values"));
+    assert!(labels.contains(&expected), "{labels:?}");
+    assert!(
+        values.iter().any(|value| value.contains("R struck E") && value.contains(", then E struck F")),
+        "{values:?}"
+    );
+}
+
+#[test]
 fn both_halves_of_a_pair_open_at_the_same_moment() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
@@ -429,6 +458,30 @@ fn both_halves_of_a_pair_open_at_the_same_moment() {
         .collect();
     let time = format!("{:.2} s", films[0].critical_frame_time().s());
     assert_eq!(clocks, [format!("without MIS · {time}"), format!("with MIS · {time}")]);
+}
+
+#[test]
+fn a_half_that_ends_shortly_before_the_critical_moment_sets_the_moment_of_both() {
+    let film = filmed("overtake-without-brake", ControllerChoice::MIS, (None, Level::Objects));
+    assert!(film.worst_collision().is_none());
+    let critical = film.critical_frame_time();
+    let ended = |before: Time| {
+        let mut early = film.clone();
+        early.frames.retain(|frame| frame.time + before <= critical);
+        early
+    };
+    let early = ended(Time::from_ms(240));
+    let films = [early.clone(), film.clone()];
+    assert_eq!(Film::shown_moment(&films), early.end());
+    let much_earlier = [ended(Time::from_ms(4_000)), film.clone()];
+    assert_eq!(Film::shown_moment(&much_earlier), critical, "the critical moment is shown");
+    let clock = |films: &[Film; 2]| -> Vec<String> {
+        let canvases = bird::Canvas::of_films(films);
+        canvases.iter().map(|canvas| bird::clock_text(canvas, canvas.film.end())).collect()
+    };
+    let expected =
+        [format!("with MIS · ended {:.2} s", early.end().s()), format!("with MIS · {:.2} s", film.end().s())];
+    assert_eq!(clock(&films), expected);
 }
 
 #[test]
@@ -461,16 +514,108 @@ fn the_verdict_on_a_pair_is_its_first_word() {
     let [baseline, tested] = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let first = |films: &[Film]| summary::verdict(films).lines().next().unwrap_or_default().to_owned();
     let sample = " · paper-figure · seed 1 · sample 0";
-    assert_eq!(first(&[baseline.clone(), tested.clone()]), format!("**PREVENTED**{sample}"));
-    assert_eq!(first(&[tested.clone(), baseline.clone()]), format!("**INDUCED**{sample}"));
-    assert_eq!(first(&[baseline.clone(), baseline.clone()]), format!("**BOTH COLLIDE**{sample}"));
-    assert_eq!(first(&[tested.clone(), tested.clone()]), format!("**NEITHER COLLIDES**{sample}"));
+    assert_eq!(first(&[baseline.clone(), tested.clone()]), format!("**PREVENTED{sample}**"));
+    assert_eq!(first(&[tested.clone(), baseline.clone()]), format!("**INDUCED{sample}**"));
+    assert_eq!(first(&[baseline.clone(), baseline.clone()]), format!("**BOTH COLLIDE{sample}**"));
+    assert_eq!(first(&[tested.clone(), tested.clone()]), format!("**NEITHER COLLIDES{sample}**"));
     let text = summary::verdict(&[baseline, tested]);
-    assert!(text.contains("- **without MIS:** R struck E from behind at "), "{text}");
+    assert!(text.contains("- **without MIS: R struck E from behind at "), "{text}");
     assert!(text.contains(" s after F braked"), "{text}");
-    assert!(text.contains("- **with MIS:** no vehicle collided; F braked at "), "{text}");
-    assert!(text.contains("; the MIS engaged at ") && text.contains("; faults: none\n"), "{text}");
-    assert!(text.contains("- Smallest headway: front "), "{text}");
+    assert!(text.contains("- **with MIS: no vehicle collided; F braked at "), "{text}");
+    assert!(text.contains("; the MIS engaged for R at ") && text.contains("; faults: none**\n"), "{text}");
+    assert!(text.contains("- **Smallest headway: front "), "{text}");
+}
+
+#[test]
+fn every_line_of_verdict_and_story_is_in_the_strong_colour() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
+    for page in [summary::verdict(&films), summary::story(&films)] {
+        for line in page.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
+            match line.strip_prefix('|') {
+                Some(_) if line.starts_with("| ---") => {}
+                Some(cells) => {
+                    let cells: Vec<&str> = cells.trim_end_matches('|').split('|').map(str::trim).collect();
+                    assert_eq!(cells.len(), 2, "{line}");
+                    assert!(cells.iter().all(|cell| cell.starts_with("**") && cell.ends_with("**")), "{line}");
+                }
+                None => {
+                    let text = line.trim_start_matches("- ");
+                    assert!(text.starts_with("**") && text.ends_with("**"), "{line}");
+                    assert_eq!(text.matches("**").count(), 2, "{line}");
+                }
+            }
+        }
+    }
+}
+
+/// The narrowest curve that has a pixel in its full colour (UI points): the edges fade over one pixel.
+const LEAST_WIDTH: f32 = 2.0;
+
+#[test]
+fn no_curve_is_so_thin_that_its_colour_fades() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let data = chunks(&[film(ControllerChoice::ACC), film(ControllerChoice::MIS)], StoreKind::Recording);
+    let mut widths = 0;
+    for chunk in &data {
+        let columns = chunk.components().values();
+        for column in columns.filter(|column| column.descriptor.component.as_str() == "SeriesLines:widths") {
+            for width in column.list_array.values().as_primitive::<Float32Type>().values() {
+                assert!(*width >= LEAST_WIDTH, "{}: {width}", chunk.entity_path());
+                widths += 1;
+            }
+        }
+    }
+    assert!(widths > 20, "{widths}");
+}
+
+#[test]
+fn the_vehicles_next_to_the_ego_have_names_from_above_and_the_scene_shows_no_label() {
+    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Objects));
+    let data = chunks(&[film], StoreKind::Recording);
+    let labels: Vec<String> = data
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
+        .flat_map(|chunk| texts(chunk, "Points2D:labels"))
+        .collect();
+    for name in ["R rear ", "second "] {
+        assert!(labels.iter().any(|label| label.starts_with(name) && label.ends_with(" behind")), "{name}");
+    }
+    for chunk in data.iter().filter(|chunk| chunk.entity_path().to_string().contains("/world/")) {
+        for column in
+            chunk.components().values().filter(|column| column.descriptor.component.as_str().ends_with(":show_labels"))
+        {
+            assert!(
+                !column.list_array.values().as_boolean().iter().flatten().any(|shown| shown),
+                "{}",
+                chunk.entity_path()
+            );
+        }
+    }
+}
+
+#[test]
+fn the_verdict_names_the_vehicle_that_was_seen_and_the_vehicle_of_the_engagement() {
+    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Events));
+    let verdict = summary::verdict(&[film]);
+    assert!(verdict.contains("the MIS engaged for R at "), "{verdict}");
+    assert!(!verdict.contains("The vehicle behind was"), "{verdict}");
+}
+
+#[test]
+fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
+    let film = filmed("faults/object-ghost", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+    let data = chunks(std::slice::from_ref(&film), StoreKind::Recording);
+    let labels: Vec<String> = data
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
+        .flat_map(|chunk| texts(chunk, "Points2D:labels"))
+        .collect();
+    assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
+    let verdict = summary::verdict(&[film]);
+    assert!(verdict.contains("the MIS engaged for a vehicle that does not exist at 2."), "{verdict}");
+    let healthy = chunks(&[default_film()], StoreKind::Recording);
+    assert!(!healthy.iter().any(|chunk| texts(chunk, "Points2D:labels").iter().any(|label| label == "does not exist")));
 }
 
 #[test]
