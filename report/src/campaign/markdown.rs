@@ -40,8 +40,8 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     let sentence = sentence(findings.judged, findings.files.len());
     let mut text = format!("## Closecall: {}\n\n", in_markdown(&sentence));
     let Reasons { weighty, settled } = Reasons::below(findings.judged, &sentence);
-    let (shown, more) = weighty.split_at(weighty.len().min(SHOWN));
-    for reason in shown {
+    let (first, more) = weighty.split_at(weighty.len().min(SHOWN));
+    for reason in first {
         text.push_str(&format!("- {}\n", in_markdown(reason)));
     }
     for (still, recording) in findings.worst_stills() {

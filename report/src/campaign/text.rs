@@ -266,7 +266,15 @@ mod tests {
             scenario: format!("s{index}"),
             expression: "count(ego_collided) <= 0".parse().unwrap(),
             source: GateSource::CommandLine,
-            evaluation: Evaluation { value: Some(value), interval_95: None, samples, hits: 0, answer, needed: None },
+            evaluation: Evaluation {
+                value: Some(value),
+                interval_95: None,
+                certainty: None,
+                samples,
+                hits: 0,
+                answer,
+                needed: None,
+            },
         }
     }
 
