@@ -18,7 +18,7 @@ use closecall_traffic::maths;
 
 use super::edges::{Edges, edges};
 use super::kind::Resolution;
-use super::receiver::MAX_INTENSITY;
+use super::power::MAX_INTENSITY;
 use super::{LaneGeometry, LidarScan};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;

@@ -14,7 +14,7 @@
 use super::LidarScan;
 use super::boxes::{BoxFit, point};
 use super::kind::MAX_LAYERS;
-use super::receiver::MAX_INTENSITY;
+use super::power::MAX_INTENSITY;
 
 /// Least power of the neighbour, in multiples of the detection threshold: half of it exceeds the
 /// threshold by 2.5 standard deviations of the noise. Otherwise the outermost beam may be missed,

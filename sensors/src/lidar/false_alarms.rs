@@ -8,8 +8,9 @@
 use super::noise::{Noise, Purpose};
 use super::pattern::Pattern;
 use super::power::LinkBudget;
+use super::power::MAX_INTENSITY;
 use super::pulse;
-use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
+use super::receiver::SensorPoseEstimate;
 use super::{LidarScan, Material, PointSource, PointTruth, ScanTruth};
 
 /// Least range of a false alarm (m).

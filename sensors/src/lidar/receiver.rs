@@ -11,7 +11,7 @@ use super::echo::{Echo, Echoes, ground_range_variances_m2, range_variances_m2};
 use super::kind::THRESHOLD_OVER_NOISE;
 use super::noise::{Noise, Purpose};
 use super::pattern::{Column, Elevation, SUBRAYS};
-use super::power::MIN_POWER;
+use super::power::{MAX_INTENSITY, MIN_POWER};
 use super::pulse::{self, DROPLET_VARIANCE_M2};
 use super::soft::{self, Air, BeamIndex, ColumnDroplets, DropletEffect, Plume, SoftEcho};
 use super::targets::{LayerMask, Targets};
@@ -19,9 +19,6 @@ use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
 use closecall_traffic::maths;
-
-/// Intensity at which the receiver saturates, as a reflectivity.
-pub(super) const MAX_INTENSITY: f32 = 4.0;
 
 /// The sensor's pose as the ego estimates it: the pitch is measured with an error.
 #[derive(Clone, Copy, Debug)]

@@ -15,7 +15,7 @@ use nalgebra::{Rotation3, Vector3};
 use super::ground::ground_reach_m;
 use super::pattern::Pattern;
 use super::power::LinkBudget;
-use super::receiver::MAX_INTENSITY;
+use super::power::MAX_INTENSITY;
 use super::viewpoint::{deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, MirrorSide, ScanEchoes};
 use closecall_traffic::Environment;

@@ -20,8 +20,9 @@
 use super::noise::{Noise, Purpose};
 use super::pattern::{Elevation, Pattern};
 use super::power::LinkBudget;
+use super::power::MAX_INTENSITY;
 use super::pulse;
-use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
+use super::receiver::SensorPoseEstimate;
 use super::{LaneGeometry, LidarScan, Material, MirrorSide, PointSource, PointTruth, ScanTruth};
 use crate::faults::LidarFault;
 use closecall_traffic::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use closecall_traffic::{Environment, VehicleClass, maths};
 
 use super::super::power::LinkBudget;
-use super::super::receiver::MAX_INTENSITY;
+use super::super::power::MAX_INTENSITY;
 use super::*;
 use crate::faults::LidarFault;
 
