@@ -24,6 +24,7 @@ mod reader;
 mod replaced;
 mod road;
 mod shape;
+mod shift;
 mod standard;
 mod stochastic;
 mod storyboard;

@@ -18,10 +18,9 @@
 
 use std::f64::consts::PI;
 
-use closecall_traffic::maths;
-
 use super::dom::{ImportError, Node};
 use super::reader::is_true;
+use super::shift::Shift;
 use super::storyboard::{STEP_S, Storyboard};
 
 /// Steps of the storyboard from one point of a path to the next: 0.25 s.
@@ -32,39 +31,6 @@ const LEAST_STEP_M: f64 = 0.5;
 /// Distance to the second point of a path whose offset does not change (m): any distance gives the
 /// same path.
 const SECOND_POINT_M: f64 = 10.0;
-/// Difference of two times that are the same but for rounding (s): numerical.
-const SAME_S: f64 = 1e-9;
-
-/// A shift within the lane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shift {
-    pub(super) vehicle: usize,
-    /// Line of the action.
-    line: usize,
-    from_m: f64,
-    to_m: f64,
-    begins_s: f64,
-    duration_s: f64,
-    is_cubic: bool,
-    /// Whether the action goes on for ever when the vehicle has the offset.
-    is_kept: bool,
-}
-
-impl Shift {
-    /// Returns the offset at a time, positive to the left (m).
-    pub(super) fn offset_m(&self, time_s: f64) -> f64 {
-        let is_over = time_s >= self.begins_s + self.duration_s - SAME_S;
-        let part = if is_over { 1.0 } else { (time_s - self.begins_s) / self.duration_s };
-        let share = if self.is_cubic { part * part * (3.0 - 2.0 * part) } else { 0.5 * (1.0 - maths::cos(PI * part)) };
-        self.from_m + share * (self.to_m - self.from_m)
-    }
-
-    /// Returns whether the action still runs.
-    pub(super) fn runs(&self, time_s: f64) -> bool {
-        self.is_kept || time_s < self.begins_s + self.duration_s - SAME_S
-    }
-}
-
 impl Storyboard<'_> {
     /// Checks that a place beside the centre of a lane (m) is within the lane.
     pub(super) fn check_offset(&self, node: &Node, name: &str, offset_m: f64) -> Result<(), ImportError> {

@@ -10,10 +10,10 @@ use std::f64::consts::PI;
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
 use super::follow::Following;
-use super::offset::Shift;
 use super::plane::nearest;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
+use super::shift::Shift;
 use super::synchronize::{ACCELERATION_MPS2, Meeting};
 use super::world::Vehicle;
 
