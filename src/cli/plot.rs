@@ -105,8 +105,8 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     let (timeout_ms, memory_mib) = args.arm.controller.limits.stated();
     let mut saved = args.trust.open(&args.source)?;
     saved.limit(timeout_ms, memory_mib);
-    let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.arms()?;
+    let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     saved.folder().check_journal()?;
     if args.comparison.paired && arms.len() < 2 {
         let sensors = arms.first().and_then(|tested| tested.sensors);

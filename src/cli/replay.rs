@@ -44,12 +44,13 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         &of_campaign(&args.saved_sample.dir).into_iter().chain(controllers).collect::<Vec<_>>(),
         &args.watch.outputs(),
     )?;
-    let (scenario, key) =
-        saved.sample_with(args.saved_sample.scenario.as_deref(), args.saved_sample.sample, &args.set.settings)?;
+    // Whether the folder is trusted is said before what is wrong in it.
     let arms = match args.paired {
         true => saved.arms()?,
         false => vec![saved.arm(args.saved_sample.controller.as_deref())?],
     };
+    let (scenario, key) =
+        saved.sample_with(args.saved_sample.scenario.as_deref(), args.saved_sample.sample, &args.set.settings)?;
     for arm in &arms {
         announce_process(saved.manifest(), arm.controller.name());
     }
