@@ -20,7 +20,9 @@ const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     }
 }
 
-/// Largest number of remarks in the head of the page. The others are folded.
+/// Largest number of gates that are not met in the head of the page. The table below it has all.
+const STATED: usize = 3;
+/// Largest number of lines below the sentence in the head of the page. Further remarks are folded.
 const REMARKS: usize = 6;
 /// Largest numbers of gates of the first table that are not met, and that are undecided beside them or alone. The
 /// others are folded. With these, a printed page has the verdict and the first gates.
@@ -39,7 +41,9 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
         !gates.contains(reason) && !judged.background.contains(reason) && !is_said(judged, &sentence, reason)
     };
     let remarks: Vec<&String> = judged.reasons.iter().filter(is_below).collect();
-    let (shown, more) = remarks.split_at(remarks.len().min(REMARKS));
+    let is_missed = |gate: &&GateResult| gate.standing() == Standing::Fail;
+    let missed: Vec<&GateResult> = worst_first(judged).into_iter().filter(is_missed).take(STATED).collect();
+    let (shown, more) = remarks.split_at(remarks.len().min(REMARKS - missed.len()));
     html! {
         header.(verdict_class(judged.verdict())) {
             p.verdict { (judged.word()) }
@@ -55,6 +59,9 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
                 p.what { (LETTERS) "." }
                 @if !findings.names_each() {
                     details { summary { "Names of the scenarios" } p.note { (findings.scenario_names()) } }
+                }
+                @if !missed.is_empty() {
+                    ul { @for gate in missed { li.failure { "NOT MET: " (gate.scenario) ": " (gate_words(gate)) } } }
                 }
                 @if !shown.is_empty() { ul { @for reason in shown { li { (reason) } } } }
                 @if !more.is_empty() {

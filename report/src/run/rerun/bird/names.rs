@@ -53,6 +53,8 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let frame = &film.frames[row];
     let ego = &frame.states[film.ego];
     let labelled_m = canvas.labelled_m();
+    // A headway after a collision says nothing, and its room is taken by the text of the collision.
+    let has_collided = film.worst_collision().is_some_and(|collision| frame.time >= collision.time);
     let mut named: Vec<usize> =
         (0..film.actors.len()).filter(|&actor| film.is_main(actor) && film.is_present(actor, row)).collect();
     // The ego and the vehicles ahead of it and behind it first, then lead and rear vehicle, then the
@@ -72,7 +74,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
             let x_m = state.s_m - ego.s_m;
             let is_shown = x_m > labelled_m[0] && x_m < labelled_m[1];
             let is_above = actor != film.ego && (x_m < 0.0 || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m());
-            let headway = headway_of(frame, actor);
+            let headway = if has_collided { String::new() } else { headway_of(frame, actor) };
             let text = format!("{label} {:.1} m/s{headway}", state.speed_mps);
             let width_m = canvas.label_m(text.chars().count());
             is_shown.then_some(Name { x_m, is_above, text, width_m })
