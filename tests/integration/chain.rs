@@ -144,10 +144,10 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
         // The colours of the picture are those of every other picture.
         let picture = fs::read_to_string(out.join(format!("encounters/{name}.svg"))).unwrap();
         let label = |track: u64| picture.lines().find(|line| line.contains(&format!(">track-{track} ")));
-        pink += u64::from(label(rear).is_some_and(|label| label.contains("#d4307c")));
-        assert!(label(rear).is_none_or(|label| label.contains("#d4307c")), "{rear}: {:?}", label(rear));
-        assert!(label(ego).is_none_or(|label| label.contains("#1f6fd1")), "{ego}: {:?}", label(ego));
-        assert!(label(lead).is_none_or(|label| label.contains("#d98200")), "{lead}: {:?}", label(lead));
+        pink += u64::from(label(rear).is_some_and(|label| label.contains("#c2246c")));
+        assert!(label(rear).is_none_or(|label| label.contains("#c2246c")), "{rear}: {:?}", label(rear));
+        assert!(label(ego).is_none_or(|label| label.contains("#1a62bb")), "{ego}: {:?}", label(ego));
+        assert!(label(lead).is_none_or(|label| label.contains("#9c5700")), "{lead}: {:?}", label(lead));
         let engagement = &origin["engagement"];
         let missing: u64 =
             engagement["missing"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();

@@ -113,7 +113,7 @@ fn every_report_says_why_samples_failed_and_which_to_replay() {
     let text = stdout(&failing(folder.path(), controller, &["--no-out"]), 5);
     assert!(!text.contains("slower than the lead vehicle"), "{text}");
     // A campaign that ends early says it, too.
-    let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast"]), 5);
+    let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast", "--jobs", "1"]), 5);
     assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");
 }
 
