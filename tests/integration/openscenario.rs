@@ -1101,13 +1101,14 @@ fn an_entity_bomb_is_refused_before_it_grows() {
 
 /// The scenarios of others that are imported; all others are refused, each at a line and an
 /// element.
-const IMPORTED: [&str; 10] = [
+const IMPORTED: [&str; 11] = [
     "alks_decelerate",
     "cut-in",
     "highway_driver",
     "slow-lead-vehicle",
     "alks_scenario_4_1_1_free_driving_template",
     "alks_scenario_4_1_2_swerving_lead_vehicle_template",
+    "alks_scenario_4_1_3_side_vehicle_template",
     "alks_scenario_4_3_1_follow_lead_vehicle_comfortable_template",
     "alks_scenario_4_3_2_follow_lead_vehicle_emergency_brake_template",
     "alks_scenario_4_4_1_cut_in_no_collision_template",
