@@ -14,7 +14,7 @@ import pytest
 from support import SCENARIO, command
 
 import closecall as cc
-from closecall.perception import Detection, PerceivedTrack, PerceptionInput, PerceptionSetup
+from closecall.perception import ClassProbabilities, Detection, PerceivedTrack, PerceptionInput, PerceptionSetup
 
 OFF = {"sensors.rear-camera.pipeline": "off", "expects": "[]"}
 SHORT = {**OFF, "duration-s": 2}
@@ -91,7 +91,13 @@ class Detects:
             return ()
         x_m, y_m, age_s, points = nearest
         covariance = [[0.02, 0.0], [0.0, 0.04]]
-        return (Detection(x_m, y_m, covariance, LENGTH_M, 1.85, points, time_ns=input.time_ns - round(1e9 * age_s)),)
+        time_ns = input.time_ns - round(1e9 * age_s)
+        classes: ClassProbabilities = {"car": 0.9, "background": 0.1}
+        return (
+            Detection(
+                x_m, y_m, covariance, LENGTH_M, 1.85, points, time_ns=time_ns, class_probabilities=classes
+            ),
+        )
 
 
 def in_a_line(text: str) -> str:

@@ -111,7 +111,7 @@ fn every_report_says_why_samples_failed_and_which_to_replay() {
     assert!(page.contains("closecall replay . 0 --scenario low-thw-overtake --controller exec"));
     // Nothing was measured.
     let text = stdout(&failing(folder.path(), controller, &["--no-out"]), 5);
-    assert!(!text.contains("slower than the lead vehicle"), "{text}");
+    assert!(!text.contains("m/s slower than the lead vehicle"), "{text}");
     // A campaign that ends early says it, too.
     let text = stdout(&failing(folder.path(), controller, &["--no-out", "--fail-fast", "--jobs", "1"]), 5);
     assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");

@@ -30,7 +30,7 @@ type View = (&'static str, [f64; 4], Content);
 /// The views of a run without camera. The edges lie well within the frames of the views.
 const RUN: [View; 7] = [
     ("verdict", [0.01, 0.09, 0.50, 0.23], Content::Text),
-    ("from above", [0.05, 0.32, 0.50, 0.45], Content::Colour),
+    ("from above", [0.05, 0.26, 0.50, 0.36], Content::Colour),
     ("scene", [0.05, 0.56, 0.50, 0.90], Content::Colour),
     ("time headway", [0.58, 0.08, 0.96, 0.25], Content::Colour),
     ("acceleration", [0.58, 0.34, 0.96, 0.45], Content::Colour),
