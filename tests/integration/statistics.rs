@@ -226,6 +226,9 @@ fn comfort_gates_report_the_limit_that_was_exceeded() {
     assert!(jerk.contains("NOT MET: low-thw-overtake-at-cut-out: largest value of: largest jerk of the ego"), "{jerk}");
     assert!(jerk.contains("required: at most 0.5 m/s³ [max(max_jerk_mps3) <= 0.5; from command line]"), "{jerk}");
     let engagements = run(&["--max-engagement-rate", "0.01"], 1);
-    assert!(engagements.contains("the margin increase system engages: 80 of 80 (100 %, two-sided 95 % interval"), "{engagements}");
+    assert!(
+        engagements.contains("the margin increase system engages: 80 of 80 (100 %, two-sided 95 % interval"),
+        "{engagements}"
+    );
     assert!(run(&["--max-engagement-rate", "1", "--max-jerk", "1000"], 0).contains("PASS"));
 }

@@ -125,7 +125,10 @@ mod tests {
             relevance.count(run, Some(Course { happened: run >= 3, acted: true }));
         }
         let reasons = relevance.not_judged();
-        assert!(reasons.len() == 1 && reasons[0].contains("1 of 4 (25.0 %, at least 50.0 % expected)"), "{reasons:?}");
+        assert!(
+            reasons.len() == 1 && reasons[0].contains("1 of 4 samples (25.0 %, at least 50.0 % expected)"),
+            "{reasons:?}"
+        );
     }
 
     #[test]

@@ -54,9 +54,8 @@ fn a_faultless_lidar_sees_the_road_where_it_is_expected_as_often_as_expected() {
     for lidar in kinds() {
         let all = beams(lidar, &LidarFault::default(), &[], 1_000);
         let [mean, square] = moments(&all);
-        // The darkest asphalt has the greatest error of the range. The heights of a scan share the
-        // error of the levelling.
-        assert!(mean.abs() < 0.2 && square < 1.2, "{}: {mean} {square}", lidar.kind.name);
+        // The stated deviation holds within 15 %. The heights of a scan share the error of the levelling.
+        assert!(mean.abs() < 0.2 && square < 1.3, "{}: {mean} {square}", lidar.kind.name);
         let expected: f64 = all.iter().map(|beam| beam.probability).sum();
         let returned = all.iter().filter(|beam| beam.has_returned).count() as f64;
         assert!(expected > 0.6 * all.len() as f64, "{}: {expected} of {}", lidar.kind.name, all.len());
@@ -105,7 +104,8 @@ fn vehicles_in_the_beams_give_returns_and_few_of_them_count_as_road() {
     assert!(missing < all.len() / 50, "{missing} of {}", all.len());
     let heights: Vec<RoadHeight> = all.iter().filter_map(|beam| beam.height).collect();
     let high = heights.iter().filter(|height| height.offset_m > 3.0 * height.sd_m).count();
-    assert!(high < heights.len() / 2, "{high} of {}", heights.len());
+    // The monitor takes a sensor for misaligned if more than 80 % of the heights lie too high.
+    assert!(5 * high < 4 * heights.len(), "{high} of {}", heights.len());
     let low = heights.iter().filter(|height| height.offset_m < -3.0 * height.sd_m).count();
     assert!(low < heights.len() / 50, "{low} of {}", heights.len());
 }
