@@ -298,7 +298,7 @@ fn wherever_letters_name_vehicles_a_line_says_which() {
         assert_eq!(times(&fs::read_to_string(Path::new(out).join(file)).unwrap()), 1, "{file}");
     }
     for args in [["replay", out, sample.as_str()], ["explain", out, sample.as_str()]] {
-        let text = stdout(&closecall(&args), 0);
+        let text = stdout(&closecall(args), 0);
         assert!(text.contains("R struck E") || text.contains("E struck F"), "{text}");
         assert_eq!(times(&text), 1, "{text}");
     }

@@ -132,6 +132,9 @@ struct Region {
     probability: f64,
 }
 
+/// Runs points with a simulator.
+type RunPoints<S> = fn(&mut S, &[Point]) -> Result<Vec<Response>, <S as Simulator>::Error>;
+
 /// The runs so far.
 struct Run<'a, S> {
     simulator: &'a mut S,
@@ -197,7 +200,7 @@ impl<S: Simulator> Run<'_, S> {
 
     fn draw_by(
         &mut self,
-        run: fn(&mut S, &[Point]) -> Result<Vec<Response>, S::Error>,
+        run: RunPoints<S>,
         mixture: &Mixture,
         count: usize,
         (part, index): (&str, u64),

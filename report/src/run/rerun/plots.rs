@@ -29,6 +29,9 @@ const LINE_WIDTH: f32 = 3.0;
 /// narrower one has no pixel in its full colour, and too little contrast.
 const THIN_LINE_WIDTH: f32 = 2.0;
 
+/// What a frame has, if it has it.
+type Of<T> = fn(&Frame) -> Option<T>;
+
 /// The role of a film among the films of a recording, which share the plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
@@ -206,7 +209,7 @@ impl Plots<'_> {
         &self,
         entity: &str,
         style: &CurveStyle<'_>,
-        (vehicle, value): (fn(&Frame) -> Option<usize>, fn(&Frame) -> Option<f64>),
+        (vehicle, value): (Of<usize>, Of<f64>),
     ) -> Result<bool, RecordingError> {
         let frames = self.film.frames.iter().map(|frame| (vehicle(frame), value(frame)));
         self.series(entity, style, &interrupted(frames))

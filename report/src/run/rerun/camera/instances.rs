@@ -45,7 +45,7 @@ pub(super) fn write<'a>(
     let images: Vec<(Time, &[Instance])> =
         frames.filter_map(|frame| frame.rear_image.as_ref().map(|image| (frame.time, &image.instances[..]))).collect();
     let marks = images.iter().map(|(time, instances)| (*time, boxes(part, instances)));
-    let (boxes, labels): (Vec<(Time, Boxes2D)>, Vec<(Time, Points2D)>) =
+    let (boxes, labels): (Vec<_>, Vec<_>) =
         marks.map(|(time, (boxes, labels))| ((time, boxes), (time, labels))).unzip();
     let masks: Vec<(Time, SegmentationImage)> =
         images.iter().map(|(time, instances)| (*time, masks(part, instances))).collect();
