@@ -63,7 +63,7 @@ pub struct Surveyed {
     /// Each run predicted from the others.
     pub check: LeaveOneOut,
     /// Standard deviation with which single runs scatter about the surface, in the unit of the number.
-    /// Slices, area and map leave it out: they are those of the surface.
+    /// Slices, area and map describe the surface, and leave it out.
     pub noise_sd: f64,
     /// The reasons to doubt the surface.
     pub doubts: Vec<Doubt>,
