@@ -11,7 +11,7 @@ use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 
-use crate::support::{all_of_library, closecall, stdout, traffic_of_library};
+use crate::support::{all_of_library, closecall, json, stdout, traffic_of_library};
 
 /// The conditions of the method on distance and closing speed.
 const NEAR_M: f64 = 100.0;
@@ -127,4 +127,18 @@ fn a_passing_lane_that_was_occupied_until_the_braking_is_the_stated_reason_and_n
     let text = stdout(&closecall(args), 0);
     assert!(text.contains("passing lane occupied"), "{text}");
     assert!(!text.contains("emergency braking required"), "{text}");
+}
+
+#[test]
+fn one_step_between_two_emergency_brakings_is_no_engagement_in_any_output() {
+    let args = ["run", "low-thw-overtake", "--seed", "31", "--sample", "199", "--sensors", "object"];
+    let text = stdout(&closecall(args), 0);
+    assert!(text.contains("the MIS stayed off: no vehicle behind in the lane"), "{text}");
+    assert!(!text.contains("the MIS engaged"), "{text}");
+    let object = json(&closecall(args.into_iter().chain(["--format", "json"])), 0);
+    let mis = &object["mis"];
+    assert!(mis["engaged_at_s"].is_null() && mis["goal_in_reach"].is_null(), "{mis}");
+    assert_eq!(mis["reason"], "no vehicle behind in the lane");
+    let spans = mis["reasons"].as_array().unwrap();
+    assert!(spans.iter().any(|span| span["reason"] == "emergency braking done"), "the pause itself is told: {mis}");
 }

@@ -104,7 +104,7 @@ fn seen(outcome: &Outcome, watch: &Watch) -> Seen {
     };
     Seen {
         approach_kmh: KMH_PER_MPS * watch.approach_mps.unwrap_or(f64::NAN),
-        engaged_at_m: watch.engaged_at_m,
+        engaged_at_m: watch.engaged_at_m.filter(|_| mis.is_some_and(|mis| mis.engaged_at_s.is_ok())),
         promised: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),
         called_off: before_critical(brakes) || before_critical(released),
         gained_s: mis.and_then(gained),

@@ -1,4 +1,16 @@
 //! Summarises the actions of the margin increase system (MIS) in a run, from its commands.
+//!
+//! An engagement is the first command that increases the margin, with one exception. While
+//! emergency braking acts, the states of the system continue beneath it, and emergency braking may
+//! pause for some control steps:
+//!
+//! ```text
+//!  emergency braking ───▶ increasing the margin ───▶ emergency braking
+//!                         └ less than 0.5 s: a pause, and no engagement
+//! ```
+//!
+//! Such a pause lies within emergency braking: it is too short for the system to build up its own
+//! braking. The reasons keep every step of the pause.
 
 use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_traffic::{Absent, CONTROL_STEP, Measured, Time};
@@ -47,12 +59,21 @@ struct Engagement {
     speed_mps: f64,
     goal_in_reach: Option<bool>,
     reason: Reason,
+    /// Whether the control step before it was one of emergency braking.
+    is_after_braking: bool,
 }
+
+/// Time that an engagement after emergency braking must last without emergency braking. In it the
+/// system builds up its whole braking: 1 m/s² within a jerk of 2 m/s³, the limits of the paper's
+/// system. It is an assumption that a shorter one is a pause of emergency braking; 0.04 to 1 s are
+/// plausible.
+const LEAST_AFTER_BRAKING: Time = Time::from_ms(500);
 
 /// Observes the margin increase system during a run.
 #[derive(Debug, Default)]
 pub(super) struct MisLog {
     engaged: Option<Engagement>,
+    last_state: Option<EgoState>,
     released_at: Option<Time>,
     thw_front_at_critical_s: Option<Measured>,
     mean_deceleration_mps2: Option<f64>,
@@ -64,6 +85,16 @@ pub(super) struct MisLog {
     /// From when to when the decision counts (s), and what ended it.
     decided: Option<([f64; 2], DecisionEnd)>,
     unavailable: Option<Unavailability>,
+}
+
+/// Returns the reason for an engagement. The first command after emergency braking states its end; its
+/// plan has what the reason of the system would say.
+fn engagement_reason(command: &EgoCommand) -> Reason {
+    match (command.reason, command.plan) {
+        (Reason::BrakingDone, Some(plan)) if plan.goal_in_reach => Reason::Engaged,
+        (Reason::BrakingDone, Some(_)) => Reason::EngagedGoalOutOfReach,
+        (reason, _) => reason,
+    }
 }
 
 /// Reasons, one after the other, for which a run has room from the start: more than most runs have.
@@ -83,6 +114,10 @@ impl MisLog {
             let first = Unavailability { from_s: now.time.s(), lasted_s: 0.0, reason };
             self.unavailable.get_or_insert(first).lasted_s += CONTROL_STEP.s();
         }
+        let last_state = self.last_state.replace(now.command.state);
+        if self.is_pause_over(now) {
+            self.forget_engagement();
+        }
         let is_active = matches!(now.command.state, EgoState::Increasing | EgoState::Holding);
         if self.engaged.is_none() && now.command.state == EgoState::Increasing {
             self.engaged = Some(Engagement {
@@ -90,8 +125,16 @@ impl MisLog {
                 thw_front_s: now.thw_front_s,
                 speed_mps: now.speed_mps,
                 goal_in_reach: now.command.plan.map(|plan| plan.goal_in_reach),
-                reason: now.command.reason,
+                reason: engagement_reason(now.command),
+                is_after_braking: last_state == Some(EgoState::EmergencyBraking),
             });
+        }
+        if let Some(engaged) = &mut self.engaged
+            && engaged.reason == Reason::BrakingDone
+            && now.command.state == EgoState::Increasing
+        {
+            // A command without a plan: the next one states why the system brakes.
+            engaged.reason = now.command.reason;
         }
         let Some(engaged) = self.engaged else { return };
         if now.rear.is_critical {
@@ -104,6 +147,21 @@ impl MisLog {
             let lasted_s = (now.time - engaged.at).s();
             self.mean_deceleration_mps2.get_or_insert((engaged.speed_mps - now.speed_mps) / lasted_s);
         }
+    }
+
+    /// Returns whether emergency braking goes on so soon after the engagement that the engagement is
+    /// a pause of it.
+    fn is_pause_over(&self, now: &MisObservation<'_>) -> bool {
+        let is_pause = |engaged: &Engagement| engaged.is_after_braking && now.time - engaged.at < LEAST_AFTER_BRAKING;
+        now.command.state == EgoState::EmergencyBraking && self.engaged.as_ref().is_some_and(is_pause)
+    }
+
+    /// Forgets the engagement, and what was measured since.
+    fn forget_engagement(&mut self) {
+        self.engaged = None;
+        self.released_at = None;
+        self.thw_front_at_critical_s = None;
+        self.mean_deceleration_mps2 = None;
     }
 
     fn note_reason(&mut self, time_s: f64, reason: Reason) {
@@ -173,5 +231,90 @@ impl MisLog {
             decided_s,
             unavailable: self.unavailable,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time headway and speed at every control step.
+    const THW_S: f64 = 1.0;
+    const SPEED_MPS: f64 = 30.0;
+
+    /// Returns the summary of a run whose stack has these states for these numbers of control steps,
+    /// one after the other. The vehicle behind is near from the start until a hazard at the first
+    /// step of emergency braking.
+    fn summary(states: &[(EgoState, Reason, usize)]) -> MisSummary {
+        let mut log = MisLog::new();
+        let mut time = Time::ZERO;
+        for &(state, reason, steps) in states {
+            for _ in 0..steps {
+                let is_hazard = state == EgoState::EmergencyBraking;
+                log.observe(&MisObservation {
+                    time,
+                    command: &EgoCommand { acceleration_mps2: 0.0, state, reason, plan: None },
+                    speed_mps: SPEED_MPS,
+                    thw_front_s: Ok(THW_S),
+                    rear: RearObservation { near: Some(2), is_hazard, ..RearObservation::default() },
+                    failed: None,
+                });
+                time += CONTROL_STEP;
+            }
+        }
+        log.finish(true).unwrap()
+    }
+
+    const BRAKES: (EgoState, Reason, usize) = (EgoState::EmergencyBraking, Reason::BrakingRequired, 20);
+    /// Steps of half a second, rounded up.
+    const HALF_A_SECOND: usize = 13;
+
+    fn increases(reason: Reason, steps: usize) -> (EgoState, Reason, usize) {
+        (EgoState::Increasing, reason, steps)
+    }
+
+    #[test]
+    fn a_pause_of_emergency_braking_is_no_engagement() {
+        let off = (EgoState::Following, Reason::NoRear, 50);
+        let pauses = [
+            vec![increases(Reason::BrakingDone, 1)],
+            vec![increases(Reason::BrakingDone, 1), increases(Reason::Engaged, HALF_A_SECOND - 2)],
+            vec![increases(Reason::BrakingDone, 1), (EgoState::Releasing, Reason::RearLost, 2)],
+        ];
+        for pause in pauses {
+            let mis = summary(&[vec![off, BRAKES], pause.clone(), vec![BRAKES]].concat());
+            assert_eq!((mis.engaged_at_s, mis.reason), (Err(Absent::NeverEngaged), Reason::NoRear), "{pause:?}");
+            assert_eq!(mis.released_at_s, Err(Absent::NeverEngaged), "{pause:?}");
+            assert_eq!(mis.mean_deceleration_mps2, Err(Absent::NeverEngaged), "{pause:?}");
+            assert_eq!(mis.reasons[2].reason, Reason::BrakingDone, "the reasons keep the pause");
+        }
+    }
+
+    #[test]
+    fn an_engagement_after_emergency_braking_counts_if_it_lasts_or_nothing_follows() {
+        let off = (EgoState::Following, Reason::NoRear, 50);
+        let at_s = Ok((CONTROL_STEP * 70).s());
+        let lasts = [increases(Reason::BrakingDone, 1), increases(Reason::Engaged, HALF_A_SECOND - 1)];
+        let mis = summary(&[&[off, BRAKES][..], &lasts, &[BRAKES]].concat());
+        assert_eq!((mis.engaged_at_s, mis.reason), (at_s, Reason::Engaged), "it lasts half a second");
+        assert!(mis.released_at_s.is_ok());
+        let mis = summary(&[off, BRAKES, lasts[0]]);
+        assert_eq!(mis.engaged_at_s, at_s, "no further emergency braking");
+    }
+
+    #[test]
+    fn an_engagement_shortly_before_emergency_braking_counts() {
+        let off = (EgoState::Following, Reason::RearUnconfirmed, 50);
+        let mis = summary(&[off, increases(Reason::Engaged, 1), BRAKES]);
+        assert_eq!((mis.engaged_at_s, mis.reason), (Ok((CONTROL_STEP * 50).s()), Reason::Engaged));
+    }
+
+    #[test]
+    fn an_engagement_after_a_pause_counts() {
+        let off = (EgoState::Following, Reason::NoRear, 50);
+        let pause = increases(Reason::BrakingDone, 1);
+        let mis = summary(&[off, BRAKES, pause, BRAKES, increases(Reason::Engaged, 100)]);
+        assert_eq!((mis.engaged_at_s, mis.reason), (Ok((CONTROL_STEP * 91).s()), Reason::Engaged));
+        assert_eq!(mis.released_at_s, Err(Absent::NotReleased));
     }
 }

@@ -401,7 +401,16 @@ impl Plots<'_> {
 
     /// Writes the front time headway gained since the MIS first engaged, with its goal.
     fn margin(&self) -> Result<bool, RecordingError> {
-        let is_increasing = |frame: &&Frame| frame.command.is_some_and(|command| command.state == EgoState::Increasing);
+        // A pause of emergency braking is no engagement, so the summary decides.
+        let mis = self.film.outcome().and_then(|outcome| outcome.mis.as_ref().ok());
+        let from = match mis.map(|mis| mis.engaged_at_s) {
+            Some(Err(_)) => return Ok(false),
+            Some(Ok(engaged_at_s)) => Time::from_s(engaged_at_s),
+            None => Time::ZERO,
+        };
+        let is_increasing = |frame: &&Frame| {
+            frame.time >= from && frame.command.is_some_and(|command| command.state == EgoState::Increasing)
+        };
         let first = self.film.frames.iter().find(is_increasing);
         let start = first.and_then(|frame| Some((frame.time, frame.margins.thw_front_s.ok()?, plan(frame))));
         let Some((since, thw_s, planned)) = start else { return Ok(false) };
