@@ -6,8 +6,7 @@
 
 use std::ops::Range;
 
-use closecall_traffic::Environment;
-
+use crate::Scene;
 use crate::lidar::{LidarKind, RearLidar};
 use crate::monitors::{Alarms, RoadBeam, RoadMonitor};
 
@@ -17,6 +16,9 @@ const SECTOR_DEG: f64 = 1.5;
 const VISITS: usize = 2;
 /// Least visibility at which the air counts as clear (m): the greatest that counts as fog (WMO).
 const CLEAR_FROM_M: f64 = 1_000.0;
+/// Speed of the ego from which heights of the road are judged (m/s): an assumption. In a jam,
+/// vehicles on all sides may stand so near that most low returns are theirs.
+const HEIGHTS_FROM_MPS: f64 = 10.0;
 
 /// The road monitor of one LiDAR, with the beams that it looks at.
 pub(super) struct RoadWatch {
@@ -41,7 +43,8 @@ impl RoadWatch {
     ///
     /// A wet road and droplets in the air take an unknown part of the light. A rain sensor tells the
     /// ego of them, and the monitor pauses.
-    pub(super) fn look(&mut self, lidar: &mut RearLidar, environment: &Environment) {
+    pub(super) fn look(&mut self, lidar: &mut RearLidar, scene: &Scene<'_>) {
+        let environment = scene.environment;
         let is_wet = environment.water_film_mm > 0.0 || environment.rain_mm_per_h > 0.0;
         if is_wet || !(environment.visibility_m >= CLEAR_FROM_M) || self.sectors.is_empty() {
             return;
@@ -53,6 +56,9 @@ impl RoadWatch {
             columns.start + self.passes % columns.len()
         });
         lidar.look_at_road(&columns, environment, &mut self.beams);
+        if scene.ego.state.speed_mps < HEIGHTS_FROM_MPS {
+            self.beams.iter_mut().for_each(RoadBeam::forget_height);
+        }
         if !self.beams.is_empty() {
             let of_column = self.beams.len() / VISITS;
             for (sector, beams) in visited.into_iter().zip(self.beams.chunks_exact(of_column)) {

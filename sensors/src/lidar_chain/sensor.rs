@@ -170,7 +170,7 @@ impl ChainSensor {
         self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
         // A silent sensor shows the monitor nothing, and a frozen one nothing new.
         if fault.is_none_or(|fault| !fault.is_dead && !fault.is_frozen) {
-            self.road_watch.look(&mut self.lidar, seen.environment);
+            self.road_watch.look(&mut self.lidar, seen);
         }
         (self.alarms, self.health) = self.judge_health(scene, fault.as_ref());
         while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {

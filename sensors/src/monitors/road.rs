@@ -8,8 +8,8 @@
 //! |---|---|---|
 //! | a sector is blocked | all beams of successive visits without a return: the product of their probabilities | 10⁻⁹, and two visits |
 //! | returns are missing | number of beams without a return in 25 scans | probability 10⁻⁹, by Chernoff |
-//! | the road is too high or too low | more than four fifths of the heights in 50 scans beyond three standard deviations and the tolerance of the mounting | see below |
-//! | the ranges scatter | more than an eighth of the heights in 50 scans beyond three standard deviations on either side | see below |
+//! | the road is too high or too low | more than four fifths of the heights in 50 scans or more beyond three standard deviations and the tolerance of the mounting | see below |
+//! | the ranges scatter | more than an eighth of the heights in 50 scans or more beyond three standard deviations on either side | see below |
 //!
 //! *Chernoff.* If λ beams without a return are expected, k or more of them have at most the
 //! probability exp(−λ)·(e·λ/k)^k, whatever the probabilities of the single beams are (Chernoff
@@ -41,10 +41,14 @@ const MOST_CERTAIN: f64 = 1.0 - 1e-6;
 const LEAST_PROBABILITY: f64 = 0.5;
 /// Number of scans over which missing returns are counted.
 const RETURN_SCANS: u32 = 25;
-/// Number of scans over which heights are counted: the SCALA looks once in all directions.
+/// Number of scans over which heights are counted, at least: the SCALA looks once in all directions.
 const HEIGHT_SCANS: u32 = 50;
-/// Number of heights, at least, for a decision.
-const LEAST_HEIGHTS: u32 = 80;
+/// Number of heights that a bare road would give, at least, for a decision. The SCALA sees 70 to
+/// 110 in 50 scans: so many depends on the pitch of the ego.
+const LEAST_EXPECTED: f64 = 90.0;
+/// Share of the heights that a bare road would give, at least, for a decision (an assumption):
+/// where vehicles hide more of the road, most heights may be returns of their tyres and bumpers.
+const LEAST_SEEN: f64 = 0.9;
 /// Standard deviations beyond which a height is unusual.
 const UNUSUAL: f64 = 3.0;
 /// Tolerance of the angle of a mounting (rad): 0.1°, to which production measures it (Kim et al.
@@ -73,8 +77,17 @@ pub(crate) struct RoadBeam {
     pub(crate) probability: f64,
     /// Whether the beam has given a return, of whatever it is.
     pub(crate) has_returned: bool,
+    /// Whether a return of the bare road would tell its height.
+    pub(crate) tells_height: bool,
     /// The height of the return, if it may be a return of the road.
     pub(crate) height: Option<RoadHeight>,
+}
+
+impl RoadBeam {
+    /// Forgets what the beam tells of the height of the road.
+    pub(crate) fn forget_height(&mut self) {
+        (self.tells_height, self.height) = (false, None);
+    }
 }
 
 /// The latest visits of a sector.
@@ -103,6 +116,8 @@ struct Returns {
 struct Heights {
     scans: u32,
     heights: u32,
+    /// Number of heights that a bare road would give.
+    expected: f64,
     /// Numbers of heights that are unusually great, and unusually small.
     unusual: [u32; 2],
     /// The same, beyond the tolerance of the mounting.
@@ -162,7 +177,7 @@ impl RoadMonitor {
             }
             (self.is_missing_returns, self.returned_share) = (are_missing, returns.returned_share());
         }
-        if self.heights.scans >= HEIGHT_SCANS {
+        if self.heights.scans >= HEIGHT_SCANS && self.heights.expected >= LEAST_EXPECTED {
             self.of_heights = std::mem::take(&mut self.heights).alarms();
         }
     }
@@ -222,6 +237,9 @@ impl Returns {
 
 impl Heights {
     fn count(&mut self, beam: &RoadBeam) {
+        if beam.tells_height {
+            self.expected += beam.probability;
+        }
         let Some(RoadHeight { offset_m, sd_m, range_m }) = beam.height else { return };
         self.heights += 1;
         let (unusual_m, tolerance_m) = (UNUSUAL * sd_m, TOLERANCE_RAD * range_m);
@@ -232,7 +250,7 @@ impl Heights {
     }
 
     fn alarms(self) -> Alarms {
-        let is_counted = self.heights >= LEAST_HEIGHTS;
+        let is_counted = f64::from(self.heights) >= LEAST_SEEN * self.expected;
         let [most, of_all] = MOST;
         let is_most = |count: &u32| count * of_all > most * self.heights;
         let is_high_or_low = is_counted && self.beyond_tolerance.iter().any(is_most);
@@ -292,7 +310,9 @@ mod tests {
                     let offset_m = if clutter < sensor.clutter { 0.08 } else { offset_m };
                     let height = RoadHeight { offset_m, sd_m: SD_M, range_m: 7.25 };
                     // The footprint of the steepest layer alone is shorter than a pulse.
-                    RoadBeam { probability, has_returned, height: (has_returned && layer == 0).then_some(height) }
+                    let tells_height = layer == 0;
+                    let height = (has_returned && tells_height).then_some(height);
+                    RoadBeam { probability, has_returned, tells_height, height }
                 });
                 monitor.observe(sector, &beams);
             }
@@ -337,7 +357,7 @@ mod tests {
 
     #[test]
     fn a_sector_is_free_again_with_its_first_return() {
-        let beam = |has_returned| RoadBeam { probability: 0.99, has_returned, height: None };
+        let beam = |has_returned| RoadBeam { probability: 0.99, has_returned, tells_height: false, height: None };
         let mut monitor = RoadMonitor::new(2);
         for _ in 0..3 {
             monitor.observe(0, &[beam(false); 4]);
@@ -352,7 +372,7 @@ mod tests {
 
     #[test]
     fn no_returns_where_none_are_expected_are_no_fault() {
-        let nothing = RoadBeam { probability: 0.0, has_returned: false, height: None };
+        let nothing = RoadBeam { probability: 0.0, has_returned: false, tells_height: false, height: None };
         let doubtful = RoadBeam { probability: 0.3, ..nothing };
         let mut monitor = RoadMonitor::new(1);
         for scan in 0..10 * RETURN_SCANS {
@@ -371,7 +391,8 @@ mod tests {
         for scan in 0..10_000 {
             let beams: [RoadBeam; 4] = std::array::from_fn(|layer| {
                 let returned: f64 = rng.random();
-                RoadBeam { probability: PROBABILITIES[layer], has_returned: returned < 0.4, height: None }
+                let probability = PROBABILITIES[layer];
+                RoadBeam { probability, has_returned: returned < 0.4, tells_height: false, height: None }
             });
             monitor.observe(scan % SECTORS, &beams);
             monitor.end_scan();
@@ -385,7 +406,7 @@ mod tests {
     #[test]
     fn a_lossy_sensor_needs_more_visits() {
         // Of a sensor that loses half of its returns by design, ten visits of four beams are rare.
-        let beam = RoadBeam { probability: 0.5, has_returned: false, height: None };
+        let beam = RoadBeam { probability: 0.5, has_returned: false, tells_height: false, height: None };
         let mut monitor = RoadMonitor::new(1);
         let visits = (1..).find(|_| {
             monitor.observe(0, &[beam; 4]);

@@ -154,14 +154,15 @@ impl Scanner {
         let echoes = self.expected_echoes(sweep, at, expected);
         let beam = at[0] * self.pattern.kind().layers() + at[1];
         let returned = self.probed.0.beam.iter().position(|of| usize::from(*of) == beam);
-        let height = match (echoes.as_slice(), returned) {
-            // Of several echoes, the first may be missed.
-            ([echo], Some(point)) => self.road_height(sweep, (at, echo), (point, expected.1)),
+        // Of several echoes, the first may be missed.
+        let only = if let [echo] = echoes.as_slice() { Some(echo) } else { None };
+        let height = match (only, returned) {
+            (Some(echo), Some(point)) => self.road_height(sweep, (at, echo), (point, expected.1)),
             _ => None,
         };
         let kept = 1.0 - self.lidar.dropout;
         let probability = 1.0 - probability_of_none(echoes.as_slice(), kept, expected.1);
-        RoadBeam { probability, has_returned: returned.is_some(), height }
+        RoadBeam { probability, has_returned: returned.is_some(), tells_height: only.is_some(), height }
     }
 
     /// Returns the height of a point above the place at which a beam should see the road; `None` if
@@ -176,12 +177,14 @@ impl Scanner {
         let [cos, sin] = self.pattern.columns[column].centre[elevation.group];
         let [tan, cosine] = elevation.centre;
         let level = echo.range_m * cosine;
-        let [_, _, expected_m] = sweep.pose.ego_frame_point_m([level * cos, level * sin, level * tan]);
+        let [ahead_m, _, expected_m] = sweep.pose.ego_frame_point_m([level * cos, level * sin, level * tan]);
         let offset_m = self.probed.0.z_m[point] - expected_m;
         let range_m = f64::from(echo.range_m);
         let sine = f64::from(sweep.pose.sensor_z_m()) / range_m;
         let range_sd_m = f64::from(faultless.range_sd_m(echo.power));
-        let sd_m = maths::hypot(range_sd_m * sine, range_m * self.lidar.levelling_sd_rad);
+        // The ego pitches about its centre, so an error of the pitch also moves the sensor.
+        let levelling_sd_m = f64::from(ahead_m) * self.lidar.levelling_sd_rad;
+        let sd_m = maths::hypot(range_sd_m * sine, levelling_sd_m);
         (offset_m.abs() < NEAR_ROAD_M).then_some(RoadHeight { offset_m: offset_m.into(), sd_m, range_m })
     }
 }

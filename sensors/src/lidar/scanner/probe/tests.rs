@@ -3,6 +3,7 @@ use closecall_traffic::{ActorId, CONTROL_STEP, Road, Stream, Time, VehicleClass,
 use super::super::super::{LaneGeometry, Lidar, LidarModel};
 use super::*;
 use crate::faults::LidarFault;
+use crate::monitors::Alarm;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::{Scene, SceneVehicle};
 
@@ -54,8 +55,8 @@ fn a_faultless_lidar_sees_the_road_where_it_is_expected_as_often_as_expected() {
     for lidar in kinds() {
         let all = beams(lidar, &LidarFault::default(), &[], 1_000);
         let [mean, square] = moments(&all);
-        // The stated deviation holds within 15 %. The heights of a scan share the error of the levelling.
-        assert!(mean.abs() < 0.2 && square < 1.3, "{}: {mean} {square}", lidar.kind.name);
+        // The stated deviation holds within 7 %. It is too great far away, where the road is brighter than assumed.
+        assert!(mean.abs() < 0.2 && square < 1.15, "{}: {mean} {square}", lidar.kind.name);
         let expected: f64 = all.iter().map(|beam| beam.probability).sum();
         let returned = all.iter().filter(|beam| beam.has_returned).count() as f64;
         assert!(expected > 0.6 * all.len() as f64, "{}: {expected} of {}", lidar.kind.name, all.len());
@@ -91,23 +92,76 @@ fn each_fault_shows_in_the_beams() {
     assert!(mean_m(&with(LidarFault { yaw_rad: 0.5_f64.to_radians(), ..none })).abs() < 0.002);
 }
 
+/// A gap behind the ego in its lane, one beside it, and the distance between lanes (m).
+struct Jam {
+    gap_m: f64,
+    beside_m: f64,
+    lane_m: f64,
+}
+
+impl Jam {
+    fn vehicles(&self, class: VehicleClass) -> [SceneVehicle; 3] {
+        let place = |actor: usize, gap_m: f64, left_m: f64| {
+            let other = scene_vehicle(actor, class, 0.0, OWN_LANE_M + left_m);
+            let s_m = EGO_S_M - gap_m - other.vehicle.dimensions.length_m;
+            with_speed(SceneVehicle { state: closecall_traffic::VehicleState { s_m, ..other.state }, ..other }, 30.0)
+        };
+        [place(1, self.gap_m, 0.0), place(2, self.beside_m, self.lane_m), place(3, self.beside_m, -self.lane_m)]
+    }
+
+    fn all() -> Vec<Self> {
+        let mut all = Vec::new();
+        // The monitor judges heights from 10 m/s on, where drivers keep some metres.
+        for gap_m in [3.0, 4.0, 6.0] {
+            for beside_m in [-3.5, -2.0, 1.0, 6.0] {
+                all.extend([3.25, 3.75].map(|lane_m| Self { gap_m, beside_m, lane_m }));
+            }
+        }
+        all
+    }
+}
+
+/// Returns whether the monitor of a LiDAR takes the road for too high or too low, or the ranges for
+/// scattered, in any of the decisions on these beams.
+fn raises_alarm(all: &[RoadBeam]) -> bool {
+    let mut monitor = crate::monitors::RoadMonitor::new(1);
+    all.chunks(8).any(|scan| {
+        monitor.observe(0, scan);
+        monitor.end_scan();
+        let alarms = monitor.alarms();
+        alarms.contains(Alarm::WrongHeight) || alarms.contains(Alarm::NoisyRanges)
+    })
+}
+
 #[test]
-fn vehicles_in_the_beams_give_returns_and_few_of_them_count_as_road() {
-    let place = |actor: usize, gap_m: f64, left_m: f64| {
-        let car = scene_vehicle(actor, VehicleClass::Car, 0.0, OWN_LANE_M + left_m);
-        let s_m = EGO_S_M - gap_m - car.vehicle.dimensions.length_m;
-        with_speed(SceneVehicle { state: closecall_traffic::VehicleState { s_m, ..car.state }, ..car }, 30.0)
-    };
-    let others = [place(1, 4.0, 0.0), place(2, 1.0, 3.75), place(3, 2.0, -3.75)];
-    let all = beams(Lidar::default(), &LidarFault::default(), &others, 1_000);
-    let missing = all.iter().filter(|beam| beam.probability > 0.98 && !beam.has_returned).count();
-    assert!(missing < all.len() / 50, "{missing} of {}", all.len());
-    let heights: Vec<RoadHeight> = all.iter().filter_map(|beam| beam.height).collect();
-    let high = heights.iter().filter(|height| height.offset_m > 3.0 * height.sd_m).count();
-    // The monitor takes a sensor for misaligned if more than 80 % of the heights lie too high.
-    assert!(5 * high < 4 * heights.len(), "{high} of {}", heights.len());
-    let low = heights.iter().filter(|height| height.offset_m < -3.0 * height.sd_m).count();
-    assert!(low < heights.len() / 50, "{low} of {}", heights.len());
+fn vehicles_all_round_give_returns_and_are_not_taken_for_the_road() {
+    let mut highest: f64 = 0.0;
+    for lidar in kinds() {
+        for class in VehicleClass::ALL {
+            for jam in Jam::all() {
+                let all = beams(lidar, &LidarFault::default(), &jam.vehicles(class), 300);
+                let missing = all.iter().filter(|beam| beam.probability > 0.98 && !beam.has_returned).count();
+                assert!(missing < all.len() / 50, "{missing} of {}", all.len());
+                assert!(!raises_alarm(&all), "{} {class:?} {} {}", lidar.kind.name, jam.gap_m, jam.beside_m);
+                let heights: Vec<RoadHeight> = all.iter().filter_map(|beam| beam.height).collect();
+                let high = heights.iter().filter(|height| height.offset_m > 3.0 * height.sd_m).count();
+                highest = highest.max(high as f64 / heights.len().max(1) as f64);
+            }
+        }
+    }
+    // In some of these places, most heights are returns of vehicles.
+    assert!(highest > 0.7, "{highest}");
+}
+
+#[test]
+fn a_sensor_that_is_too_low_is_noticed_on_a_bare_road_and_beside_a_truck() {
+    let low = LidarFault { height_m: -0.08, ..LidarFault::default() };
+    let [_, left, _] = Jam { gap_m: 30.0, beside_m: 6.0, lane_m: 3.75 }.vehicles(VehicleClass::Truck);
+    for lidar in kinds() {
+        for others in [&[][..], &[left]] {
+            assert!(raises_alarm(&beams(lidar, &low, others, 300)), "{} {}", lidar.kind.name, others.len());
+        }
+    }
 }
 
 #[test]
