@@ -56,7 +56,8 @@ impl RoadWatch {
             columns.start + self.passes % columns.len()
         });
         lidar.look_at_road(&columns, environment, &mut self.beams);
-        if scene.ego.state.speed_mps < HEIGHTS_FROM_MPS {
+        // In a scene turned by half a turn, the ego drives backward.
+        if scene.ego.state.speed_mps.abs() < HEIGHTS_FROM_MPS {
             self.beams.iter_mut().for_each(RoadBeam::forget_height);
         }
         if !self.beams.is_empty() {

@@ -23,7 +23,10 @@
 //! thirds.
 //!
 //! *Sectors.* A sensor that loses returns everywhere is not blocked. The probability of a return in
-//! a sector is therefore multiplied by the share of all beams that gave one in the latest 25 scans.
+//! a sector is therefore multiplied by the share of the beams that gave one in the latest 25 scans.
+//! A sensor with a blocked sector, however wide, does not lose returns elsewhere. A visit of several
+//! beams without any return therefore says nothing of missing returns. Without such visits, fewer
+//! misses are expected, so that the bound holds.
 
 use closecall_traffic::maths;
 
@@ -109,6 +112,8 @@ struct Returns {
     beams: u32,
     expected_misses: f64,
     misses: u32,
+    /// Number of beams of the visits without any return, which are not among these beams.
+    empty: u32,
 }
 
 /// The heights in some scans.
@@ -158,8 +163,9 @@ impl RoadMonitor {
     /// Notes the beams of a visit of a sector.
     pub(crate) fn observe(&mut self, sector: usize, beams: &[RoadBeam]) {
         self.sectors[sector].visit((beams, self.returned_share), &mut self.blocked);
+        let is_empty = beams.len() > 1 && !beams.iter().any(|beam| beam.has_returned);
         for beam in beams {
-            self.returns.count(beam);
+            self.returns.count(beam, is_empty);
             self.heights.count(beam);
         }
     }
@@ -216,17 +222,25 @@ impl Sector {
 }
 
 impl Returns {
-    fn count(&mut self, beam: &RoadBeam) {
-        if beam.probability >= LEAST_PROBABILITY {
+    fn count(&mut self, beam: &RoadBeam, is_visit_empty: bool) {
+        if beam.probability < LEAST_PROBABILITY {
+            return;
+        }
+        if is_visit_empty {
+            self.empty += 1;
+        } else {
             self.beams += 1;
             self.expected_misses += 1.0 - beam.probability.min(MOST_CERTAIN);
             self.misses += u32::from(!beam.has_returned);
         }
     }
 
-    /// Returns the share of the beams that have given a return.
+    /// Returns the share of the beams outside blocked sectors that have given a return. If returns are
+    /// missing, visits without any are among the losses.
     fn returned_share(self) -> f64 {
-        if self.beams > 0 { 1.0 - f64::from(self.misses) / f64::from(self.beams) } else { 1.0 }
+        let empty = if self.are_missing() { self.empty } else { 0 };
+        let (misses, beams) = (self.misses + empty, self.beams + empty);
+        if beams > 0 { 1.0 - f64::from(misses) / f64::from(beams) } else { 1.0 }
     }
 
     /// Returns whether more returns are missing than a faultless sensor loses.

@@ -114,16 +114,20 @@ fn faultless_sensors_raise_nothing_on_any_road_in_any_weather_and_at_a_standstil
 
 #[test]
 fn a_blocked_sector_anywhere_is_noticed_and_forgotten_when_it_is_free() {
-    for from_deg in [-65.0, -40.2, -1.5, 0.0, 20.7, 62.0] {
+    let sectors = [(-65.0, 3.0), (-40.2, 3.0), (-1.5, 3.0), (0.0, 3.0), (20.7, 3.0), (62.0, 3.0)];
+    let wide = [(-3.0, 6.0), (10.0, 20.0), (-30.0, 60.0), (-60.0, 100.0)];
+    for (from_deg, width_deg) in sectors.into_iter().chain(wide) {
         let fault = format!(
             "blocked-from-deg = {from_deg:.1}\nblocked-to-deg = {:.1}\nfrom-s = 1.0\nuntil-s = 6.0",
-            from_deg + 3.0
+            from_deg + width_deg
         );
         let alarms = Drive { fault: &fault, ..Drive::default() }.run();
         let is_blocked = |alarms: &SensorAlarms| alarms.rear.contains(Alarm::BlockedSector);
         let first = alarms.iter().position(is_blocked).unwrap_or_default();
         // From step 25 on, within 4 s.
         assert!((26..125).contains(&first), "{from_deg}: {first}");
+        let is_other = |alarms: &SensorAlarms| alarms.rear.iter().any(|alarm| alarm != Alarm::BlockedSector);
+        assert!(!alarms.iter().any(is_other), "{from_deg} for {width_deg}");
         assert!(alarms[200..].iter().all(|alarms| alarms.rear.is_empty()), "{from_deg}");
     }
 }

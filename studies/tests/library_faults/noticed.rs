@@ -31,7 +31,6 @@ fn expected(name: &str, sensor: Of) -> Option<(Alarm, f64)> {
         "dropout" | "dirty" if is_lidar => Some((Alarm::MissingReturns, 2.0)),
         "height" | "pitch" | "misaligned" => Some((Alarm::WrongHeight, 4.0)),
         "noisy" if is_lidar => Some((Alarm::NoisyRanges, 4.0)),
-        "blocked" if sensor == Of::FrontLidar => Some((Alarm::BlockedSector, 12.0)),
         "blocked" if is_lidar => Some((Alarm::BlockedSector, 4.0)),
         _ => None,
     }
