@@ -27,6 +27,7 @@
 mod answer;
 pub mod hosted;
 mod library;
+mod message;
 mod process;
 mod question;
 
