@@ -232,7 +232,7 @@ const fn word(name: &'static str, standard: &'static [&'static str]) -> Attribut
     Attribute { name, kind: Kind::Word { standard, read: standard } }
 }
 
-/// An enumeration of which only a part is read.
+/// An enumeration that is read in part.
 const fn some(name: &'static str, standard: &'static [&'static str], read: &'static [&'static str]) -> Attribute {
     Attribute { name, kind: Kind::Word { standard, read } }
 }
