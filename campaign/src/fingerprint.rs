@@ -150,7 +150,7 @@ fn hashes(files: Vec<(String, PathBuf)>) -> Vec<FileHash> {
     files.into_iter().map(hash).collect()
 }
 
-/// Returns the files that a perception program names, each as it is named and with its path: those of its command, or its library.
+/// Returns the files that a perception program names, each as it is named and with its path: the files of its command, or its library.
 pub fn program_files(program: &ProgramSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     match program.kind {
         ProgramKind::Exec => named_files(&command_settings(program), folder),

@@ -1,4 +1,4 @@
-//! The clusters of the LiDAR in all scenarios of the library are those of the definition of DBSCAN,
+//! The clusters of the LiDAR in all scenarios of the library follow the definition of DBSCAN,
 //! with either implementation.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 

@@ -93,7 +93,7 @@ pub(crate) fn functions() -> String {
     short(&hasher)
 }
 
-/// Returns the arms that are run: those of the function if a human drives the ego, and the two stacks otherwise.
+/// Returns the arms that are run: the function's arms if a human drives the ego, and the two stacks otherwise.
 fn arms(file: &ScenarioFile) -> [ControllerChoice; 2] {
     match file.config().function {
         Function::AebWithHuman => ControllerChoice::of_function(Function::AebWithHuman),
