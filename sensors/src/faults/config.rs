@@ -14,7 +14,8 @@ use super::object::ObjectFaultConfig;
 use super::radar::RadarFaultConfig;
 use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 use crate::camera::CameraFault;
-use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
+use crate::kept::kept;
+use crate::lidar::MAX_HALF_FIELD_DEG;
 
 /// Longest additional latency (s).
 pub(super) const MAX_DELAY_S: f64 = 0.4;
@@ -245,7 +246,7 @@ impl LidarFaultConfig {
         if *self == (Self { from_s, until_s, sensor, ..Self::default() }) {
             return Err(without_effect());
         }
-        let fault = LidarFault { sensor: self.sensor.as_deref().map(intern_name), ..fault };
+        let fault = LidarFault { sensor: self.sensor.as_deref().map(kept), ..fault };
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
     }
 }
