@@ -93,11 +93,10 @@ impl Fingerprint {
     fn of_native(settings: &NativeSettings, folder: Option<&Path>) -> Self {
         let path = folder.map_or_else(|| PathBuf::from(&settings.path), |folder| folder.join(&settings.path));
         let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
-        let stated = settings.probe(folder).unwrap_or_default();
         Self {
             command: settings.text(),
             files: vec![FileHash { name: settings.path.clone(), blake3 }],
-            identity: Identity { name: stated.name, version: stated.version },
+            identity: settings.probe(folder).unwrap_or_default(),
             open_files: Vec::new(),
         }
     }

@@ -7,7 +7,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 /// A plot with its axes, to which series are added.
-pub(crate) type Plane<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub(crate) type Plane<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Writes a plot to the path in the first word. `ranges` has the ends of both axes.
 pub(crate) fn write(
@@ -15,7 +15,7 @@ pub(crate) fn write(
     size_px: (u32, u32),
     caption: &str,
     ranges: [(f64, f64); 2],
-    draw: impl FnOnce(&mut Plane<'_, '_>) -> Result<(), Box<dyn Error>>,
+    draw: impl FnOnce(&mut Plane<'_>) -> Result<(), Box<dyn Error>>,
 ) -> Result<(), Box<dyn Error>> {
     let path: PathBuf = words.into_iter().next().ok_or("give the path of the SVG to write")?.into();
     let area = SVGBackend::new(&path, size_px).into_drawing_area();

@@ -39,7 +39,7 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
     plot::write(words, SIZE_PX, "Echo pulse width", [RANGE_M, WIDTH_NS], draw)
 }
 
-fn draw(chart: &mut Plane<'_, '_>) -> Result<(), Box<dyn Error>> {
+fn draw(chart: &mut Plane<'_>) -> Result<(), Box<dyn Error>> {
     chart.configure_mesh().light_line_style(WHITE).x_desc("range [m]").y_desc("echo pulse width [ns]").draw()?;
     for (index, (name, reflectivity, window_transmission)) in LINES.into_iter().enumerate() {
         let config = LidarConfig { window_transmission: Num::Fixed(window_transmission), ..LidarConfig::default() };

@@ -111,7 +111,7 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
     })
 }
 
-fn draw(chart: &mut Plane<'_, '_>, driver: &Wiedemann99) -> Result<(), Box<dyn Error>> {
+fn draw(chart: &mut Plane<'_>, driver: &Wiedemann99) -> Result<(), Box<dyn Error>> {
     let cells: Vec<_> = steps(GAP_M, CELL.1).flat_map(|gap_m| stretches(driver, gap_m)).collect();
     for (regime, name, colour) in REGIMES {
         let style = colour.filled();

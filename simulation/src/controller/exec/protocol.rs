@@ -1,6 +1,6 @@
 //! Writes the messages to a process, and parses its answers.
 
-use closecall_controllers::external::{RoadMessage, StepMessage};
+use closecall_controllers::external::{Identity, RoadMessage, StepMessage};
 use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front};
 use closecall_traffic::{CONTROL_STEP, Road};
 use serde::{Deserialize, Serialize};
@@ -51,17 +51,6 @@ pub(crate) fn to_line(message: &impl Serialize) -> Vec<u8> {
 pub(super) struct Answer {
     pub(super) acceleration_mps2: f64,
     pub(super) state: EgoState,
-}
-
-/// The statements of a process in its first answer.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    /// Its name.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Its version.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub version: Option<String>,
 }
 
 /// Checks the answer to the first message, and returns what the process states about itself.
