@@ -131,7 +131,7 @@ fn shape(message: &str) -> String {
         let end = number.find(|c: char| !is_in_word(c) && c != '.').unwrap_or(number.len());
         // A full stop ends the sentence, not the number.
         let (number, after) = number.split_at(number[..end].trim_end_matches('.').len());
-        // The digits of `mps2` are no number; those of `track_7` are one.
+        // The digits of `mps2` are no number; the digit of `track_7` is one.
         let is_number = !shape.ends_with(|c: char| c.is_alphanumeric());
         shape.push_str(if is_number && !names_error(&shape, number, after) { "#" } else { number });
         rest = after;

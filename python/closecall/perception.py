@@ -257,7 +257,7 @@ class Detection:
     width_is_seen: bool = False
     #: Height of the highest point (m).
     top_m: float = 1.5
-    #: Time at which the position holds, at most 0.2 s before the question; by default that of the question.
+    #: Time at which the position holds, at most 0.2 s before the question; by default the question's time.
     time_ns: int | None = None
     #: By default nothing is known.
     class_probabilities: ClassProbabilities | None = None

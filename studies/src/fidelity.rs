@@ -14,7 +14,7 @@
 //! ```
 //!
 //! has the least variance of all β. Covariance and variances are estimated from the samples; nothing is assumed of how well the modes
-//! agree. If they do not agree at all, β is about 0 and the estimate is that of the full chain. (Control variates: Lemieux, *Monte
+//! agree. If they do not agree at all, β is about 0 and the estimate is the estimate of the full chain. (Control variates: Lemieux, *Monte
 //! Carlo and Quasi-Monte Carlo Sampling*, 2009, section 4.1; with a mean that is estimated itself: Schmeiser, Taaffe and Wang,
 //! *Biased control-variate estimation*, 2001.)
 //!

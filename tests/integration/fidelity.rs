@@ -43,7 +43,7 @@ fn fast_runs_narrow_the_interval_of_a_rate_and_other_campaigns_are_refused() {
     // The cruise control does not look back: the modes hardly differ in its arm.
     assert!(of_baseline["correlation"].as_f64().unwrap() > 0.9, "{of_baseline}");
     assert!(sharp < 0.6 * width(&of_baseline["plain_interval_95"]), "{of_baseline}");
-    // The exact interval of all fast samples, of which 900 are known, is about as wide: the fast runs give no more than they have.
+    // The exact interval of all 900 known fast samples is about as wide: the fast runs give no more than they have.
     assert!(of_baseline["estimate"]["worth_samples"].as_f64().unwrap() < 900.0, "{of_baseline}");
     let induced = &report["rates"][3];
     assert_eq!(induced["of"], "induced");

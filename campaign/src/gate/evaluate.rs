@@ -420,15 +420,18 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
 mod tests {
     use super::*;
 
+    /// Independent samples of a scenario that varies, without a baseline.
+    const EVIDENCE: Evidence = Evidence {
+        is_paired: false,
+        is_varied: true,
+        is_built_in: [true; 2],
+        inference: Inference::FixedSamples,
+        is_weighted: false,
+    };
+
     /// Returns whether a gate of a flag is lost after these samples and hits.
     fn is_lost(gate: &str, hits: u64, samples: u64, rest: u64) -> bool {
-        let evidence = Evidence {
-            is_paired: true,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::FixedSamples,
-            is_weighted: false,
-        };
+        let evidence = Evidence { is_paired: true, ..EVIDENCE };
         Accumulator { hits, samples, ..Accumulator::new(gate.parse().unwrap()) }.is_lost(&evidence, rest)
     }
 
@@ -451,37 +454,24 @@ mod tests {
 
     #[test]
     fn an_extreme_beyond_its_bound_is_lost_and_a_mean_is_not() {
-        let evidence = Evidence {
-            is_paired: false,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::FixedSamples,
-            is_weighted: false,
-        };
         let after = |gate: &str, value: f64| {
             let expression: Expression = gate.parse().unwrap();
             let (smallest, largest) = (Some(value), Some(value));
             Accumulator { samples: 30, sum: 30.0 * value, smallest, largest, ..Accumulator::new(expression) }
-                .is_lost(&evidence, 1_000)
+                .is_lost(&EVIDENCE, 1_000)
         };
         assert!(after("min(min_ttc_rear_s) >= 1", 0.5) && !after("min(min_ttc_rear_s) >= 1", 1.0));
         assert!(after("max(max_jerk_mps3) <= 5", 5.1) && !after("max(max_jerk_mps3) >= 5", 4.0));
         assert!(after("max(max_jerk_mps3) <= 5", f64::NAN), "what is not a number satisfies no bound");
         assert!(!after("mean(max_jerk_mps3) <= 5", 9.0) && !after("sum(harm) <= 5", 9.0));
-        let design = Evidence { inference: Inference::Sequential, ..evidence };
+        let design = Evidence { inference: Inference::Sequential, ..EVIDENCE };
         let gate = Accumulator { hits: 9, samples: 9, ..Accumulator::new("count(engaged) <= 0".parse().unwrap()) };
-        assert!(gate.is_lost(&evidence, 1) && !gate.is_lost(&design, 1));
+        assert!(gate.is_lost(&EVIDENCE, 1) && !gate.is_lost(&design, 1));
     }
 
     #[test]
     fn weighted_samples_decide_only_what_does_not_depend_on_how_often_they_happen() {
-        let evidence = Evidence {
-            is_paired: false,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::Design,
-            is_weighted: true,
-        };
+        let evidence = Evidence { inference: Inference::Design, is_weighted: true, ..EVIDENCE };
         let answer = |gate: &str| {
             let expression: Expression = gate.parse().unwrap();
             let gate = Accumulator { samples: 400, hits: 0, smallest: Some(2.0), ..Accumulator::new(expression) };
@@ -498,13 +488,6 @@ mod tests {
 
     #[test]
     fn an_extreme_and_a_percentile_say_how_sure_they_are() {
-        let evidence = Evidence {
-            is_paired: false,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::FixedSamples,
-            is_weighted: false,
-        };
         let certainty = |gate: &str, values: &[f64], evidence: &Evidence| {
             let expression: Expression = gate.parse().unwrap();
             let samples = values.len() as u64;
@@ -514,13 +497,13 @@ mod tests {
         let values: Vec<f64> = (1..=299).rev().map(f64::from).collect();
         // 59 samples reach beyond the 95th percentile with 95 % confidence, and 58 do not.
         for (count, is_within) in [(58, false), (59, true)] {
-            let Some(Certainty::ShareBeyond(share)) = certainty("max(max_jerk_mps3) <= 5", &values[..count], &evidence)
+            let Some(Certainty::ShareBeyond(share)) = certainty("max(max_jerk_mps3) <= 5", &values[..count], &EVIDENCE)
             else {
                 panic!("an extreme has a share");
             };
             assert_eq!(share <= 0.05, is_within, "{count}: {share}");
         }
-        let bound = |gate: &str, count: usize| certainty(gate, &values[..count], &evidence);
+        let bound = |gate: &str, count: usize| certainty(gate, &values[..count], &EVIDENCE);
         assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 299), Some(Certainty::PercentileBound(1.0)));
         assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 298), None, "the smallest of 298 may be above");
         assert_eq!(bound("p99(max_jerk_mps3) <= 5", 299), Some(Certainty::PercentileBound(299.0)));
@@ -532,12 +515,12 @@ mod tests {
         for gate in ["mean(max_jerk_mps3) <= 5", "sum(harm) <= 5", "count(engaged) <= 5"] {
             assert_eq!(bound(gate, 299), None, "{gate}");
         }
-        let of_design = Evidence { inference: Inference::Design, ..evidence };
-        let of_one = Evidence { is_varied: false, ..evidence };
+        let of_design = Evidence { inference: Inference::Design, ..EVIDENCE };
+        let of_one = Evidence { is_varied: false, ..EVIDENCE };
         for other in [of_design, of_one] {
             assert_eq!(certainty("max(max_jerk_mps3) <= 5", &values, &other), None);
         }
-        assert_eq!(certainty("max(max_jerk_mps3) <= 5", &[1.0, f64::NAN], &evidence), None);
+        assert_eq!(certainty("max(max_jerk_mps3) <= 5", &[1.0, f64::NAN], &EVIDENCE), None);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //!            ◀── last lines, for error messages ─────────────── standard error  ┘
 //! ```
 //!
-//! The process is a child as that of a controller ([`exec`](crate::controller::exec)), with the same framing, limits and errors:
+//! The process is a child, as a controller is ([`exec`](crate::controller::exec)), with the same framing, limits and errors:
 //! one line of JSON per message, at most 1 MiB long in an answer. The arrays of a scan are base64 of little-endian numbers, so that a
 //! point costs 30 bytes instead of some 60 as JSON numbers, and NumPy reads an array in one call. Each answer must repeat the `time_ns` of
 //! its question.
@@ -27,6 +27,7 @@
 mod answer;
 pub mod hosted;
 mod library;
+mod message;
 mod process;
 mod question;
 

@@ -4,13 +4,13 @@
 //!  failing samples ─▶ nearest first ─▶ nominal labels, first failing point of the ray ─▶ nearest three ─▶ design point
 //! ```
 //!
-//! Distances are those of standard normal space, in which the parameters of the scenario are
+//! Distances are in standard normal space, in which the parameters of the scenario are
 //! independent, whatever their distributions and rank correlations are (for a Gaussian copula this
 //! is the transformation of A. Nataf; P.-L. Liu and A. Der Kiureghian, *Multivariate distribution
 //! models with prescribed marginals and covariances*, Probabilistic Engineering Mechanics 1 (1986)
 //! 105–112). Of all failing cases, the nearest one has the largest probability density there.
 //!
-//! The random streams of drivers and sensors have no distance. Each search keeps those of the sample
+//! The random streams of drivers and sensors have no distance. Each search keeps the streams of the sample
 //! from which it starts. A label that fails as well at its nominal value is set to it first; the
 //! search then moves the numbers only.
 
@@ -249,7 +249,7 @@ impl Found<'_> {
     }
 }
 
-/// Returns the random numbers of a search. They differ from those of the sample.
+/// Returns the random numbers of a search. They differ from the sample's numbers.
 fn random_numbers(case: &Case) -> Stream {
     #[expect(clippy::expect_used, reason = "a constant, and every test draws from it")]
     let owner = ActorId::new(OWNER).expect("a legal name");

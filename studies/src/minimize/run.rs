@@ -114,7 +114,7 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
     Ok(Some(Minimized { why_more_than_three, ..minimized }))
 }
 
-/// Describes a case that fails with these values, of which the named ones are off nominal.
+/// Describes a case that fails with these values. The named ones are off nominal.
 pub(super) fn described(
     trial: &Trial<'_>,
     values: &Parameters,

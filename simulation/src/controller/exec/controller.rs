@@ -10,9 +10,8 @@ use closecall_traffic::{Road, Time};
 
 use super::child::Child;
 use super::error::ExecError;
-use super::protocol::Identity;
 use super::settings::ExecSettings;
-use super::{NAME, protocol};
+use super::{Identity, NAME, protocol};
 use crate::run::ControllerFactory;
 
 /// Time limit of the answer to the first message. The process may first have to load an interpreter and its libraries,

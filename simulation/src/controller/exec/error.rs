@@ -163,7 +163,7 @@ impl ExecError {
     }
 }
 
-/// Returns true if a time limit is as long as that of a start: whoever exceeds it hangs.
+/// Returns true if a time limit is as long as the limit of a start: whoever exceeds it hangs.
 pub(super) const fn is_long(limit_ms: u128) -> bool {
     limit_ms >= 10_000
 }

@@ -57,12 +57,12 @@ mod settings;
 mod start;
 
 pub use child::Child;
+pub use closecall_controllers::external::Identity;
 pub(crate) use controller::START_TIMEOUT;
 pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
 pub use lines::NEW_SAMPLE;
 pub(crate) use lines::excerpt;
 pub use processes::{adopt_orphans, end_all};
-pub use protocol::Identity;
-pub(crate) use protocol::{PROTOCOL, RoadMessage, check_hello, to_line};
+pub(crate) use protocol::{PROTOCOL, check_hello, to_line};
 pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME};
