@@ -19,6 +19,8 @@ use crate::external::loaded::Loaded;
 enum Message {
     Hello(Box<Hello>),
     Step(Box<Step>),
+    /// The run has ended: its controller is freed.
+    End,
 }
 
 #[derive(Deserialize)]
@@ -193,6 +195,10 @@ pub fn serve(
             Message::Step(step) => {
                 let time_ns = step.time_ns;
                 text(session.step((loaded, table), || setup.clone(), &Input::from(*step))?, time_ns)
+            }
+            Message::End => {
+                session = Session::default();
+                json!({ "type": "end" }).to_string()
             }
         };
         let written = writeln!(answers, "{answer}").and_then(|()| answers.flush());

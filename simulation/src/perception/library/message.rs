@@ -11,6 +11,8 @@ use serde::Deserialize;
 pub(super) enum Message {
     Hello(Box<Hello>),
     Scans(Box<Scans>),
+    /// The run has ended.
+    End,
 }
 
 #[derive(Deserialize)]
