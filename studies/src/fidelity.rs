@@ -130,6 +130,19 @@ impl Fidelity {
         (fidelity.samples == samples).then_some(fidelity)
     }
 
+    /// Removes the rates from the folder of a campaign whose samples are others by now. A folder
+    /// without rates stays as it is.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be removed.
+    pub fn remove(folder: &Folder) -> Result<(), WriteError> {
+        let path = folder.file(FIDELITY_FILE);
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(WriteError::new(&path, source)),
+            _ => Ok(()),
+        }
+    }
+
     /// Writes the rates into the folder of the campaign.
     ///
     /// # Errors

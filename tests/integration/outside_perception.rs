@@ -156,6 +156,11 @@ fn each_wrong_answer_ends_the_sample_and_names_the_field() {
         ("tracks", "other-list", "`tracks` must be a list of at most 256, it is absent"),
         ("tracks", "crash", "the process ended (exit status: 3) after 29 answers; it last wrote: the roof is on fire"),
         ("tracks", "last-words", "a line that nobody had asked for"),
+        (
+            "tracks",
+            "leaves",
+            "the process crashed (signal: 6 (SIGABRT)) after its last answer, when its input was closed",
+        ),
         ("tracks", "hello", "the sensors failed to perceive: `"),
         ("tracks", "hello", "`answers` must be \"detections\" or \"tracks\", it is \"boxes\""),
         ("detections", "nan", "`x_m` must be a finite number, it is NaN"),

@@ -18,8 +18,13 @@ use crate::external::message::{RoadMessage, StepMessage};
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 enum Message {
-    Hello { settings: Value, road: RoadMessage },
+    Hello {
+        settings: Value,
+        road: RoadMessage,
+    },
     Step(Box<StepMessage>),
+    /// The run has ended: its controller is freed.
+    End,
 }
 
 /// Answers every message of `requests` with a line to `answers`, until there are no more. The table
@@ -50,6 +55,10 @@ pub fn serve(
                 let values = step_values(Time::from_ns(time_ns), &odometry, front.as_ref(), sensors);
                 let input = Input::with(values, tracks.iter().map(Track::from).collect());
                 text(session.step((loaded, table), || setup.clone(), &input)?, time_ns)
+            }
+            Message::End => {
+                session = Session::default();
+                json!({ "type": "end" }).to_string()
             }
         };
         let written = writeln!(answers, "{answer}").and_then(|()| answers.flush());

@@ -14,6 +14,8 @@ use serde::{Deserialize, Serialize};
 pub(super) enum Message {
     Hello(Box<Hello>),
     Scans(Box<Scans>),
+    /// The run has ended.
+    End,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -20,7 +20,8 @@
 //! 3. At each control step in which a scan of some LiDAR is due, Closecall sends `{"type":"scans","time_s":…,"time_ns":…,"odometry":{…},
 //!    "pose":{…},"scans":[…],"radar_scans":[…]}`. A run without rear radars has neither `radars` nor `radar_scans`.
 //! 4. The process answers `{"time_ns":…,"detections":[…]}` or `{"time_ns":…,"tracks":[…]}`, as it has announced.
-//! 5. At the end of the run Closecall closes the standard input, and reads what is left, which must be nothing.
+//! 5. At the end of the run Closecall closes the standard input, and reads what is left, which must be nothing. The process ends, or
+//!    is killed half a second later. A crash is an error.
 //!
 //! `docs/reference/perception.md` has every key.
 

@@ -24,7 +24,7 @@ use serde::Serialize;
 
 use super::design_point::{Cases, DesignPoint};
 use super::run::{Minimized, described, with_choice};
-use super::trial::Trial;
+use super::trial::{Trial, WithoutOutcome};
 use crate::case::{Case, CausesError, fails};
 use crate::failures::passes;
 
@@ -142,6 +142,7 @@ impl NearestSearch {
         let starts = self.starts();
         let mut found: Vec<Found<'_>> = Vec::new();
         let (mut tried, mut runs) = (0, 0);
+        let mut without_outcome: Option<WithoutOutcome> = None;
         for Start { case, point } in &starts {
             if !found.is_empty() && runs >= most_runs / 2 {
                 break;
@@ -150,8 +151,9 @@ impl NearestSearch {
             let first = drawn_in(&trial, point.clone());
             tried += 1;
             runs += trial.runs();
-            if let Some((point, has_converged)) = first {
-                found.push(Found { trial, point, has_converged });
+            match first {
+                Some((point, has_converged)) => found.push(Found { trial, point, has_converged }),
+                None => without_outcome = WithoutOutcome::joined(without_outcome, trial.without_outcome()),
             }
             if found.last().is_some_and(|found| found.length_sd() == 0.0) {
                 break;
@@ -167,7 +169,13 @@ impl NearestSearch {
             }
         }
         let Some(nearest) = found.iter().min_by(|a, b| a.length_sd().total_cmp(&b.length_sd())) else {
-            return Err(passes(saved, &self.case));
+            return Err(match without_outcome {
+                Some(WithoutOutcome { message, .. }) => {
+                    let controller = self.case.arm.controller.name().to_owned();
+                    CausesError::NoOutcome { scenario: self.case.file.config().name.clone(), controller, message }
+                }
+                None => passes(saved, &self.case),
+            });
         };
         let details = NearestFailure {
             runs,
@@ -181,7 +189,9 @@ impl NearestSearch {
         let names: Vec<ParameterName> = values.iter().map(|(name, _)| name).filter(is_off).cloned().collect();
         let described = described(trial, &values, &names, &[])?;
         let distance_sd = Some(nearest.length_sd());
-        Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, ..described }))
+        let of_found = found.iter().map(|one| one.trial.without_outcome());
+        let without_outcome = of_found.fold(without_outcome, WithoutOutcome::joined);
+        Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, without_outcome, ..described }))
     }
 
     /// Returns the failing samples that are nearest to the nominal case, the nearest first. A sample

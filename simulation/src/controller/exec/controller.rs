@@ -162,6 +162,9 @@ impl EgoController for ExecController {
     }
 
     fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
-        self.child.as_mut().map_or(Ok(()), Child::finish).map_err(|error| self.failure(&error, time))
+        let Some(child) = &mut self.child else { return Ok(()) };
+        // The process of a library or an FMU first frees the controller.
+        let finished = if self.repeats_time { child.finish_run(self.settings.timeout()) } else { child.finish() };
+        finished.map_err(|error| self.failure(&error, time))
     }
 }

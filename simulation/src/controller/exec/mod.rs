@@ -39,7 +39,8 @@
 //!    then compared.
 //! 5. At the end of the run Closecall closes the standard input and reads the rest of the output. A
 //!    line without a question is an error, here and before each step: another line may have been
-//!    taken for the answer to another step.
+//!    taken for the answer to another step. So is an end by a signal, unless Closecall itself kills
+//!    the process half a second later.
 //!
 //! # Errors
 //! If the process does not give a valid answer, the sample ends as an error with a message that

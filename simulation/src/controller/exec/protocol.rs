@@ -12,6 +12,10 @@ use super::lines::excerpt;
 /// Version of the protocol.
 pub(crate) const PROTOCOL: u32 = 1;
 
+/// The line that asks a process of this program to free what it has run, and the line that answers
+/// it. The protocol of other processes does not have it.
+pub(super) const END: &str = r#"{"type":"end"}"#;
+
 const ACCELERATION_KEY: &str = "acceleration_mps2";
 const STATE_KEY: &str = "state";
 /// The key under which an answer repeats the time of its control step.

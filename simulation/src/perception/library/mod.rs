@@ -78,6 +78,10 @@ pub fn serve(path: &Path, requests: impl BufRead, mut answers: impl Write) -> Re
                     Err(reason) => json!({ "time_ns": question.time_ns, ERROR_KEY: reason }),
                 }
             }
+            Message::End => {
+                drop(run.take());
+                json!({ "type": "end" })
+            }
         };
         let written = writeln!(answers, "{answer}").and_then(|()| answers.flush());
         written.map_err(|error| format!("failed to answer: {error}"))?;
