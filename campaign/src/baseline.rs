@@ -83,6 +83,13 @@ pub enum BaselineError {
     },
 }
 
+impl ScenarioBaseline {
+    /// Returns true if every sample ended in an error.
+    const fn has_no_outcome(&self) -> bool {
+        self.errors == self.samples
+    }
+}
+
 impl Baseline {
     /// Returns the results of the arm under test of a campaign.
     ///
@@ -189,7 +196,11 @@ impl Baseline {
         }
         let is_new = |name: &&String| !self.scenarios.contains_key(*name);
         let new_scenarios = current.scenarios.keys().filter(is_new).cloned().collect();
-        Ok(BaselineComparison { scenarios: compared, new_scenarios })
+        let has_no_outcome =
+            |scenario: &&ScenarioBaselineComparison| current.scenarios[&scenario.scenario].has_no_outcome();
+        let without_outcome =
+            compared.iter().filter(has_no_outcome).map(|scenario| scenario.scenario.clone()).collect();
+        Ok(BaselineComparison { scenarios: compared, new_scenarios, without_outcome })
     }
 }
 
@@ -221,12 +232,20 @@ pub struct BaselineComparison {
     pub scenarios: Vec<ScenarioBaselineComparison>,
     /// The scenarios that the baseline does not have.
     pub new_scenarios: Vec<String>,
+    /// The scenarios of the baseline whose samples all end in an error in the later campaign.
+    pub without_outcome: Vec<String>,
 }
 
 impl BaselineComparison {
     /// Returns true if a sample newly fails or a margin regresses.
     pub fn is_regression(&self) -> bool {
         self.scenarios.iter().any(|scenario| !scenario.newly_failing.is_empty() || !scenario.margins.is_empty())
+    }
+
+    /// Returns true if the later campaign has outcomes of every scenario of the baseline, and the
+    /// baseline has a scenario. Without outcomes nothing is compared.
+    pub fn is_compared(&self) -> bool {
+        self.without_outcome.is_empty() && !self.scenarios.is_empty()
     }
 
     /// Returns true if a sample fails in the baseline and passes in the later campaign.
@@ -326,6 +345,22 @@ mod tests {
         );
         assert!(comparison.is_regression() && comparison.has_fixed());
         assert!(!baseline(&[2], 4.0).compare(&baseline(&[2], 4.0), 0.0).unwrap().is_regression());
+    }
+
+    #[test]
+    fn samples_that_all_end_in_an_error_are_not_compared() {
+        let mut failing = baseline(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 4.0);
+        let scenario = failing.scenarios.get_mut("headline").unwrap();
+        scenario.errors = 9;
+        let comparison =
+            |current: &Baseline| baseline(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 4.0).compare(current, 0.05).unwrap();
+        assert!(comparison(&failing).is_compared(), "one sample has an outcome");
+        failing.scenarios.get_mut("headline").unwrap().errors = 10;
+        let nothing = comparison(&failing);
+        assert!(!nothing.is_regression() && !nothing.is_compared());
+        assert_eq!(nothing.without_outcome, ["headline"]);
+        let empty = Baseline { scenarios: BTreeMap::new(), ..failing.clone() };
+        assert!(!empty.compare(&failing, 0.05).unwrap().is_compared(), "a baseline without a scenario");
     }
 
     #[test]
