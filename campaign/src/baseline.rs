@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::input::read_text;
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
-pub const BASELINE_VERSION: u32 = 2;
+pub const BASELINE_VERSION: u32 = 3;
 
 /// The results of a campaign that a repository keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +42,8 @@ pub struct Baseline {
     pub design: Design,
     /// The controller under test.
     pub controller: String,
+    /// The sensors; `None` for the sensors of each scenario.
+    pub sensors: Option<SensorMode>,
     /// The results of each scenario, by its name.
     pub scenarios: BTreeMap<String, ScenarioBaseline>,
     /// BLAKE3 hash of all other fields, as JSON. The hash shows an edit. It does not prevent
@@ -118,6 +121,7 @@ impl Baseline {
             seed: manifest.sampling.seed,
             design: manifest.sampling.design,
             controller: manifest.arms.last().map(ToString::to_string).unwrap_or_default(),
+            sensors: manifest.sensors,
             scenarios: collected.into_iter().map(|(name, scenario)| (name, scenario.finish())).collect(),
         };
         Ok(baseline.signed())
@@ -181,6 +185,9 @@ impl Baseline {
         same("the version of the layout", self.schema_version.to_string(), current.schema_version.to_string())?;
         same("the seed", self.seed.to_string(), current.seed.to_string())?;
         same("the sampling design", self.design.to_string(), current.design.to_string())?;
+        // Without errors of perception fewer samples fail.
+        let sensors = |mode: Option<SensorMode>| mode.map_or("as in the scenario", SensorMode::name).to_owned();
+        same("the sensor mode", sensors(self.sensors), sensors(current.sensors))?;
         let mut compared = Vec::new();
         for (name, before) in &self.scenarios {
             let missing = || BaselineError::Different {
@@ -330,6 +337,7 @@ mod tests {
             seed: 1,
             design: Design::Random,
             controller: "mis".to_owned(),
+            sensors: None,
             scenarios: BTreeMap::from([("headline".to_owned(), scenario)]),
             content_blake3: String::new(),
         }
@@ -378,7 +386,8 @@ mod tests {
     #[test]
     fn other_samples_cannot_be_compared() {
         let before = baseline(&[], 4.0);
-        let changes: [fn(&mut Baseline); 4] = [
+        let changes: [fn(&mut Baseline); 5] = [
+            |other| other.sensors = Some(SensorMode::GroundTruth),
             |other| other.seed = 2,
             |other| other.design = Design::Sobol,
             |other| other.scenarios.clear(),

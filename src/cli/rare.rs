@@ -471,6 +471,11 @@ fn check_event(event: EventExpression, work: &Work, has_gate: bool) -> Result<()
             "--max-probability bounds the probability of one event, and `{event}` is a difference of two"
         )));
     }
+    if has_gate && event.first.quantity.is_of_baseline() {
+        return Err(CliError::usage(format!(
+            "--max-probability judges the controller under test, and `{event}` is an event of the baseline alone"
+        )));
+    }
     for quantity in event.events().map(|event| event.quantity) {
         let Some((measure, in_baseline)) = quantity.measure() else { continue };
         let arm = if in_baseline { work.arms.first() } else { work.arms.last() };

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::support::{closecall, code, folder, json, library, program, stderr, stdout};
+use closecall_testing::has_python;
+
+use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
 
 /// Options that gate, and options that do not, each with a value that everything meets.
 const OPTIONS: [&[&str]; 20] = [
@@ -238,4 +240,36 @@ fn a_gate_that_demands_less_than_the_gate_of_a_file_is_overridden() {
     std::fs::write(elsewhere.join("closecall.toml"), "[gate]\nrequire = ['max(max_jerk_mps3) <= 1']\n").unwrap();
     let text = stdout(&run(&["--max-jerk", "500"], &elsewhere), 4);
     assert!(text.contains("gate max(max_jerk_mps3) <= 1, replaced by max(max_jerk_mps3) <= 500"), "{text}");
+}
+
+#[test]
+fn a_baseline_from_outside_that_no_check_was_written_for_is_overridden() {
+    if !has_python() {
+        return;
+    }
+    let path = library("overtake-without-brake");
+    let arms = "exec:python3 examples/acc_controller.py";
+    let fixed = ["campaign", path.to_str().unwrap(), "-n", "60", "--sensors", "ground-truth"];
+    let more = ["--arms", arms, "--arms", "mis", "--controller-timeout-ms", "60000"];
+    let text = stdout(&closecall(fixed.iter().chain(&more)), 4);
+    assert!(text.contains("OVERRIDDEN") && text.contains("and not `acc`"), "{text}");
+}
+
+#[test]
+fn a_rare_event_that_no_run_or_every_run_has_and_one_of_the_baseline_are_no_gate() {
+    let path = library("overtake-without-brake");
+    let fixed = ["campaign", path.to_str().unwrap(), "--sensors", "ground-truth", "--design", "importance", "--paired"];
+    for (event, part) in [
+        ("harm < 0", "no value of `harm` lies on the other side of 0"),
+        ("min_ttc_rear_s < -1e9", "on the other side of -1e9"),
+        ("baseline.ego_collided", "an event of the baseline alone"),
+    ] {
+        let more = ["--event", event, "--guide", "min_gap_rear_m", "--max-probability", "0.5", "-n", "100"];
+        let output = closecall(fixed.iter().chain(&more));
+        assert_eq!(code(&output), 2, "{event}: {}", stderr(&output));
+        assert!(message(&output).contains(part), "{event}: {}", stderr(&output));
+    }
+    // A search that hardly ran has not looked.
+    let words = ["campaign", path.to_str().unwrap(), "--sensors", "ground-truth", "--design", "search", "-n", "1"];
+    stdout(&closecall(words.iter().chain(&["--event", "collision"])), 4);
 }

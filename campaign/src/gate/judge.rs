@@ -12,6 +12,7 @@ use super::course::{Course, asks_for_action, missing_action};
 use super::evaluate::{Accumulator, Evaluation, Evidence};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
+use crate::attribution;
 use crate::coverage::{CoverageCounter, CoverageResult};
 use crate::ledger::Inference;
 use crate::record::Record;
@@ -75,14 +76,16 @@ pub struct Judge {
 }
 
 /// Returns a message if another controller stands in for the baseline of the scenario's function,
-/// and a check compares with the baseline. The collisions that it fails to prevent would count for
+/// and a check or `MIS-9` compares with the baseline. The collisions that it fails to prevent would count for
 /// the system under test.
 fn other_baseline(work: &Work) -> Option<String> {
     let config = work.file.config();
     let [baseline, _] = ControllerChoice::of_function(config.function);
     let arm = work.arms.first().filter(|_| work.arms.len() > 1)?;
     let (name, expected) = (arm.controller.name(), baseline.name());
-    let compares = config.checks.values().flatten().any(Expression::needs_pairs);
+    // MIS-9 allows the ego to slow down as much as the baseline does.
+    let is_attributed = config.requirements.iter().any(|mark| mark == attribution::REQUIREMENT);
+    let compares = is_attributed || config.checks.values().flatten().any(Expression::needs_pairs);
     (compares && name != expected).then(|| format!("the baseline is `{name}` and not `{expected}`"))
 }
 

@@ -22,7 +22,7 @@ use std::str::FromStr;
 
 use crate::coverage::CoverageName;
 
-use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
+use super::measure::{LARGEST, MEASURES, Measure, MeasureKind, PairFlag};
 
 /// A value that is computed from all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,11 +99,6 @@ impl Comparison {
         self.threshold.abs() > LARGEST || self.measure.least().is_some_and(is_beyond)
     }
 }
-
-/// Amount that no measure of a run exceeds, in its unit (s, m, m/s, m/s², m/s³ or deaths): an
-/// assumption; 1e4 to 1e9 are plausible. A time to collision of two vehicles of the same speed may,
-/// and says nothing then.
-const LARGEST: f64 = 1e6;
 
 /// The value of one sample that is aggregated.
 #[derive(Clone, Copy, Debug, PartialEq)]

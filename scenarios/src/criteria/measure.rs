@@ -72,6 +72,11 @@ impl Measure {
 /// The measures that rest on the states that a controller reports.
 const REPORTED: [&str; 4] = ["engaged", "goal_in_reach", "thw_gain_s", "emergency_braked"];
 
+/// Amount that no measure of a run exceeds, in its unit (s, m, m/s, m/s², m/s³ or deaths): an
+/// assumption; 1e4 to 1e9 are plausible. A time to collision of two vehicles of the same speed may,
+/// and says nothing then.
+pub(super) const LARGEST: f64 = 1e6;
+
 /// The numbers that are 0 or more by definition.
 const NOT_NEGATIVE: [&str; 4] = ["impact_speed_mps", "delta_v_mps", "harm", "duration_s"];
 
