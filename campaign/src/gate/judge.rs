@@ -76,8 +76,8 @@ pub struct Judge {
 }
 
 /// Returns a message if another controller stands in for the baseline of the scenario's function,
-/// and a check or `MIS-9` compares with the baseline. The collisions that it fails to prevent would count for
-/// the system under test.
+/// and a check or `MIS-9` compares with the baseline. The collisions that it fails to prevent would
+/// count for the system under test.
 fn other_baseline(work: &Work) -> Option<String> {
     let config = work.file.config();
     let [baseline, _] = ControllerChoice::of_function(config.function);
