@@ -42,6 +42,8 @@ pub enum OpenReason {
     WeightedSamples,
     /// The samples are points of a design, and a bound of a probability needs independent ones.
     DependentSamples,
+    /// The bound is the end of the range of the value, or lies beyond it.
+    HoldsAlways,
 }
 
 impl OpenReason {
@@ -58,6 +60,9 @@ impl OpenReason {
             Self::WeightedSamples => {
                 "the samples of the design coverage visit each bin as often as any other, so that only a count, a smallest and a \
                  largest value say something"
+            }
+            Self::HoldsAlways => {
+                "it holds whatever happens in these samples, and says nothing of them: set a bound that can be missed"
             }
             Self::NothingVaries => "no parameter varies enough, so that no probability can be bounded",
             Self::SelfReported => {
@@ -85,7 +90,7 @@ pub struct Evidence {
 /// Smallest number of samples with which a gate on a count, a sum, a mean or an extreme is met (-):
 /// an assumption; 10 to 59 are plausible. An event that none of 20 samples shows has a probability
 /// of up to 14 %, with 95 % confidence.
-const LEAST_SAMPLES: u64 = 20;
+pub const LEAST_SAMPLES: u64 = 20;
 
 /// Returns the smallest number of samples with which a gate is met. A percentile needs enough
 /// samples to reach beyond it with the confidence of a bound: 59 for the 5th and the 95th, 299 for
@@ -172,6 +177,7 @@ impl Evaluation {
         let holds = |share: f64| expression.operator.holds(share, expression.bound);
         let answer = match covered {
             None => Answer::Open(OpenReason::NotInCoverage),
+            Some((_, samples)) if expression.holds_always(samples) => Answer::Open(OpenReason::HoldsAlways),
             Some((share, _)) if holds(share) => Answer::Met,
             Some(_) => Answer::Missed,
         };
@@ -285,7 +291,11 @@ impl Accumulator {
         let is_percentile = matches!(aggregate, Aggregate::Percentile(_));
         // Few samples do not show a percentile. Their count or extreme is a fact.
         let answer = if operator.holds(observed, bound) {
-            if is_enough { Answer::Met } else { Answer::Open(OpenReason::TooFewSamples) }
+            match is_enough {
+                true if self.expression.holds_always(samples) => Answer::Open(OpenReason::HoldsAlways),
+                true => Answer::Met,
+                false => Answer::Open(OpenReason::TooFewSamples),
+            }
         } else if is_percentile && !is_enough || is_bound && self.is_undecided(inference) {
             Answer::Open(OpenReason::TooFewSamples)
         } else {
@@ -450,6 +460,41 @@ mod tests {
         }
         assert!(!is_lost("count(induced) <= 2", 2, 10, 5), "the bound is allowed");
         assert!(!is_lost("upper(induced) <= 0.01", 0, 20, 0), "too few samples are no failure");
+    }
+
+    #[test]
+    fn a_gate_that_no_sample_can_miss_is_open() {
+        let evidence = Evidence {
+            is_paired: true,
+            is_varied: true,
+            is_built_in: [true; 2],
+            inference: Inference::FixedSamples,
+            is_weighted: false,
+        };
+        let answer = |gate: &str| {
+            let expression: Expression = gate.parse().unwrap();
+            let (smallest, largest) = (Some(1.0), Some(2.0));
+            Accumulator { samples: 60, hits: 3, sum: 90.0, smallest, largest, ..Accumulator::new(expression) }
+                .evaluate(&evidence)
+                .answer
+        };
+        for gate in [
+            "count(ego_collided) >= 0",
+            "count(ego_collided) <= 60",
+            "share(ego_collided) <= 1",
+            "upper(ego_collided) <= 1",
+            "lower(prevented | baseline.ego_collided) >= 0",
+            "max(max_jerk_mps3) <= 1e300",
+            "sum(harm) >= 0",
+        ] {
+            assert_eq!(answer(gate), Answer::Open(OpenReason::HoldsAlways), "{gate}");
+        }
+        for gate in ["count(ego_collided) <= 59", "share(ego_collided) >= 0.01", "max(max_jerk_mps3) <= 1000"] {
+            assert_eq!(answer(gate), Answer::Met, "{gate}");
+        }
+        let covered = |gate: &str| Evaluation::of_coverage(&gate.parse().unwrap(), Some((0.4, 60))).answer;
+        assert_eq!(covered("coverage(gap) >= 0"), Answer::Open(OpenReason::HoldsAlways));
+        assert_eq!(covered("coverage(gap) >= 0.4"), Answer::Met);
     }
 
     #[test]
