@@ -77,11 +77,11 @@ pub struct Judge {
 
 /// Returns a message if another controller stands in for the baseline of the scenario's function,
 /// and a check or `MIS-9` compares with the baseline. The collisions that it fails to prevent would
-/// count for the system under test.
+/// count for the system under test. A controller from outside is the user's own baseline.
 fn other_baseline(work: &Work) -> Option<String> {
     let config = work.file.config();
     let [baseline, _] = ControllerChoice::of_function(config.function);
-    let arm = work.arms.first().filter(|_| work.arms.len() > 1)?;
+    let arm = work.arms.first().filter(|arm| work.arms.len() > 1 && arm.controller.is_built_in())?;
     let (name, expected) = (arm.controller.name(), baseline.name());
     // MIS-9 allows the ego to slow down as much as the baseline does.
     let is_attributed = config.requirements.iter().any(|mark| mark == attribution::REQUIREMENT);
