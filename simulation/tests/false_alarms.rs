@@ -1,5 +1,4 @@
 //! The monitors of the sensors raise nothing in all faultless scenarios of the library.
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use std::path::Path;
 

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall_testing::has_python;
 
 use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
 

@@ -83,7 +83,7 @@ fn with_names(names: &[String], rows: &str) -> String {
 
 /// Returns an expression that a browser breaks only between words: at spaces, after `_` and `(`, and after a `.` between
 /// names.
-pub fn breakable(expression: &str) -> Markup {
+pub(crate) fn breakable(expression: &str) -> Markup {
     let mut last = ' ';
     let ends_word = |letter: char| {
         let is_end = matches!(letter, '_' | '(') || letter == '.' && last.is_alphabetic();
