@@ -309,7 +309,7 @@ mod tests {
         assert_eq!((scenario.outcomes, scenario.same), (0, 4));
         assert_eq!(Regression::of(&[scenario.clone()], 0, 0.05), Regression::NotCompared);
         let compared = ScenarioComparison { outcomes: 4, ..scenario.clone() };
-        assert_eq!(Regression::of(&[compared.clone()], 0, 0.05), Regression::None);
+        assert_eq!(Regression::of(std::slice::from_ref(&compared), 0, 0.05), Regression::None);
         assert_eq!(Regression::of(&[compared, scenario], 0, 0.05), Regression::NotCompared);
         assert_eq!(Regression::of(&[], 0, 0.05), Regression::NotCompared);
     }
