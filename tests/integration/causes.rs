@@ -214,13 +214,11 @@ fn runs_without_an_outcome_in_a_search_are_counted_with_a_message() {
     let output = closecall(words.into_iter().chain(["--controller-timeout-ms", "60000", "--record", "failures:0"]));
     assert_eq!(code(&output), 5, "{}", stderr(&output));
     let file = parent.path().join("nearest.toml");
-    let words = ["minimize", dir, "--nearest", "-n", "60", "--out", file.to_str().unwrap()];
-    let result = json(&closecall(words.into_iter().chain(["--format", "json"])), 0);
-    let without = &result["minimized"]["without_outcome"];
-    assert!(without["runs"].as_u64().unwrap() > 0, "{result:#}");
-    assert!(without["message"].as_str().unwrap().contains("lost the vehicle behind"), "{without:#}");
-    let text = stdout(&closecall(words), 0);
-    assert!(text.contains("of the search ended in an ERROR and count as not failing, such as: "), "{text}");
+    // Each run starts a process.
+    let text = stdout(&closecall(["minimize", dir, "--nearest", "-n", "20", "--out", file.to_str().unwrap()]), 0);
+    let line =
+        text.lines().find(|line| line.contains("of the search ended in an ERROR and count as not failing, such as: "));
+    assert!(line.is_some_and(|line| line.ends_with("lost the vehicle behind")), "{text}");
 }
 
 #[test]
