@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-
 use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
 
 /// Options that gate, and options that do not, each with a value that everything meets.
