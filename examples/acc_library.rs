@@ -5,7 +5,7 @@
 //! closecall run low-thw-overtake --controller lib:target/release/examples/libacc_library.so
 //! ```
 //!
-//! A library of your own is a crate with `crate-type = ["cdylib"]` that needs nothing of Closecall: the types below are those of
+//! A library of your own is a crate with `crate-type = ["cdylib"]` that needs nothing of Closecall: the types below come from
 //! `controllers/include/closecall_controller.h`, which documents them.
 
 #![expect(unsafe_code, reason = "the interface passes pointers")]

@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::input::read_text;
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
-pub const BASELINE_VERSION: u32 = 2;
+pub const BASELINE_VERSION: u32 = 3;
 
 /// The results of a campaign that a repository keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +42,8 @@ pub struct Baseline {
     pub design: Design,
     /// The controller under test.
     pub controller: String,
+    /// The sensors; `None` for the sensors of each scenario.
+    pub sensors: Option<SensorMode>,
     /// The results of each scenario, by its name.
     pub scenarios: BTreeMap<String, ScenarioBaseline>,
     /// BLAKE3 hash of all other fields, as JSON. The hash shows an edit. It does not prevent
@@ -83,6 +86,13 @@ pub enum BaselineError {
     },
 }
 
+impl ScenarioBaseline {
+    /// Returns true if every sample ended in an error.
+    const fn has_no_outcome(&self) -> bool {
+        self.errors == self.samples
+    }
+}
+
 impl Baseline {
     /// Returns the results of the arm under test of a campaign.
     ///
@@ -111,6 +121,7 @@ impl Baseline {
             seed: manifest.sampling.seed,
             design: manifest.sampling.design,
             controller: manifest.arms.last().map(ToString::to_string).unwrap_or_default(),
+            sensors: manifest.sensors,
             scenarios: collected.into_iter().map(|(name, scenario)| (name, scenario.finish())).collect(),
         };
         Ok(baseline.signed())
@@ -174,6 +185,9 @@ impl Baseline {
         same("the version of the layout", self.schema_version.to_string(), current.schema_version.to_string())?;
         same("the seed", self.seed.to_string(), current.seed.to_string())?;
         same("the sampling design", self.design.to_string(), current.design.to_string())?;
+        // Without errors of perception fewer samples fail.
+        let sensors = |mode: Option<SensorMode>| mode.map_or("as in the scenario", SensorMode::name).to_owned();
+        same("the sensor mode", sensors(self.sensors), sensors(current.sensors))?;
         let mut compared = Vec::new();
         for (name, before) in &self.scenarios {
             let missing = || BaselineError::Different {
@@ -189,7 +203,11 @@ impl Baseline {
         }
         let is_new = |name: &&String| !self.scenarios.contains_key(*name);
         let new_scenarios = current.scenarios.keys().filter(is_new).cloned().collect();
-        Ok(BaselineComparison { scenarios: compared, new_scenarios })
+        let has_no_outcome =
+            |scenario: &&ScenarioBaselineComparison| current.scenarios[&scenario.scenario].has_no_outcome();
+        let without_outcome =
+            compared.iter().filter(has_no_outcome).map(|scenario| scenario.scenario.clone()).collect();
+        Ok(BaselineComparison { scenarios: compared, new_scenarios, without_outcome })
     }
 }
 
@@ -221,12 +239,20 @@ pub struct BaselineComparison {
     pub scenarios: Vec<ScenarioBaselineComparison>,
     /// The scenarios that the baseline does not have.
     pub new_scenarios: Vec<String>,
+    /// The scenarios of the baseline whose samples all end in an error in the later campaign.
+    pub without_outcome: Vec<String>,
 }
 
 impl BaselineComparison {
     /// Returns true if a sample newly fails or a margin regresses.
     pub fn is_regression(&self) -> bool {
         self.scenarios.iter().any(|scenario| !scenario.newly_failing.is_empty() || !scenario.margins.is_empty())
+    }
+
+    /// Returns true if the later campaign has outcomes of every scenario of the baseline, and the
+    /// baseline has a scenario. Without outcomes nothing is compared.
+    pub fn is_compared(&self) -> bool {
+        self.without_outcome.is_empty() && !self.scenarios.is_empty()
     }
 
     /// Returns true if a sample fails in the baseline and passes in the later campaign.
@@ -311,6 +337,7 @@ mod tests {
             seed: 1,
             design: Design::Random,
             controller: "mis".to_owned(),
+            sensors: None,
             scenarios: BTreeMap::from([("headline".to_owned(), scenario)]),
             content_blake3: String::new(),
         }
@@ -329,6 +356,22 @@ mod tests {
     }
 
     #[test]
+    fn samples_that_all_end_in_an_error_are_not_compared() {
+        let mut failing = baseline(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 4.0);
+        let scenario = failing.scenarios.get_mut("headline").unwrap();
+        scenario.errors = 9;
+        let comparison =
+            |current: &Baseline| baseline(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 4.0).compare(current, 0.05).unwrap();
+        assert!(comparison(&failing).is_compared(), "one sample has an outcome");
+        failing.scenarios.get_mut("headline").unwrap().errors = 10;
+        let nothing = comparison(&failing);
+        assert!(!nothing.is_regression() && !nothing.is_compared());
+        assert_eq!(nothing.without_outcome, ["headline"]);
+        let empty = Baseline { scenarios: BTreeMap::new(), ..failing.clone() };
+        assert!(!empty.compare(&failing, 0.05).unwrap().is_compared(), "a baseline without a scenario");
+    }
+
+    #[test]
     fn a_margin_regresses_only_beyond_the_tolerance() {
         let regresses = |before, after, tolerance| {
             baseline(&[], before).compare(&baseline(&[], after), tolerance).unwrap().is_regression()
@@ -343,7 +386,8 @@ mod tests {
     #[test]
     fn other_samples_cannot_be_compared() {
         let before = baseline(&[], 4.0);
-        let changes: [fn(&mut Baseline); 4] = [
+        let changes: [fn(&mut Baseline); 5] = [
+            |other| other.sensors = Some(SensorMode::GroundTruth),
             |other| other.seed = 2,
             |other| other.design = Design::Sobol,
             |other| other.scenarios.clear(),

@@ -107,6 +107,8 @@ pub struct ScenarioComparison {
     pub scenario: String,
     /// Number of samples.
     pub samples: u64,
+    /// Number of samples that have an outcome in the later campaign.
+    pub outcomes: u64,
     /// Number of samples whose outcomes agree to the last bit, the controller's name aside.
     pub same: u64,
     /// Samples in which the ego collides in the later campaign and not in the baseline.
@@ -135,6 +137,7 @@ impl ScenarioComparison {
         Self {
             scenario: scenario.to_owned(),
             samples: 0,
+            outcomes: 0,
             same: 0,
             newly_failing: Vec::new(),
             fixed: Vec::new(),
@@ -153,6 +156,7 @@ impl ScenarioComparison {
 
     fn push(&mut self, sample: u64, baseline: &ArmRecord, current: &ArmRecord) {
         self.samples += 1;
+        self.outcomes += u64::from(current.result.is_ok());
         self.same += u64::from(is_same(baseline, current));
         match (&baseline.result, &current.result) {
             (Ok(before), Ok(after)) => {
@@ -199,6 +203,9 @@ pub enum Regression {
     None,
     /// Samples end in an error that had an outcome. This takes precedence over [`Self::Worse`].
     NewErrors,
+    /// All samples of some scenario end in an error, as in the earlier campaign: nothing is compared
+    /// there.
+    NotCompared,
     /// More samples fail than allowed, or a margin has shrunk.
     Worse,
 }
@@ -213,6 +220,8 @@ impl Regression {
             Self::NewErrors
         } else if newly_failing as u64 > max_newly_failing || has_lost_margin {
             Self::Worse
+        } else if scenarios.is_empty() || scenarios.iter().any(|scenario| scenario.outcomes == 0) {
+            Self::NotCompared
         } else {
             Self::None
         }
@@ -224,6 +233,7 @@ impl fmt::Display for Regression {
         f.write_str(match self {
             Self::None => "NO REGRESSION",
             Self::NewErrors => "NEW ERRORS",
+            Self::NotCompared => "NOT COMPARED",
             Self::Worse => "REGRESSION",
         })
     }
@@ -283,4 +293,24 @@ fn differing_parameter(before: &Record, after: &Record) -> Option<String> {
     let (before, after) = (parameters(before)?, parameters(after)?);
     let mut names = before.iter().chain(after.iter()).map(|(name, _)| name);
     names.find(|name| before.get(name) != after.get(name)).map(ToString::to_string)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::SampleFailure;
+
+    #[test]
+    fn samples_without_an_outcome_in_either_campaign_are_no_evidence() {
+        let failure = SampleFailure { kind: "controller".to_owned(), message: "it ended".to_owned() };
+        let failed = ArmRecord::new("own".to_owned(), Err(failure));
+        let mut scenario = ScenarioComparison::new("close");
+        (0..4).for_each(|sample| scenario.push(sample, &failed, &failed));
+        assert_eq!((scenario.outcomes, scenario.same), (0, 4));
+        assert_eq!(Regression::of(&[scenario.clone()], 0, 0.05), Regression::NotCompared);
+        let compared = ScenarioComparison { outcomes: 4, ..scenario.clone() };
+        assert_eq!(Regression::of(std::slice::from_ref(&compared), 0, 0.05), Regression::None);
+        assert_eq!(Regression::of(&[compared, scenario], 0, 0.05), Regression::NotCompared);
+        assert_eq!(Regression::of(&[], 0, 0.05), Regression::NotCompared);
+    }
 }

@@ -2,8 +2,9 @@
 //! sample to run again.
 //!
 //! Two failures are of one kind if they have the same controller, the same name, and the same
-//! message apart from its numbers: measured values, times, counts, steps, process numbers and
-//! addresses differ from sample to sample. Only the numbers that name an error tell kinds apart:
+//! message apart from its numbers, with the plural that goes with them, and its names of temporary
+//! files: measured values, times, counts, steps, process numbers and addresses differ from sample to
+//! sample. Only the numbers that name an error tell kinds apart:
 //! error codes, exit statuses, signals and lines of a source file. The list is bounded, whatever the
 //! controllers write: the failures beyond it are counted as others.
 
@@ -12,6 +13,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::record::Record;
+use super::variable_words::{in_one_number, without_random_names};
 
 /// Largest number of kinds of one scenario that are told apart by their messages.
 const MOST_KINDS: usize = 16;
@@ -121,8 +123,13 @@ impl Failures {
     }
 }
 
-/// Returns a message with `#` for each number, except the numbers that name an error.
+/// Returns what the messages of a kind have in common.
 fn shape(message: &str) -> String {
+    in_one_number(&without_numbers(&without_random_names(message)))
+}
+
+/// Returns a message with `#` for each number, except the numbers that name an error.
+fn without_numbers(message: &str) -> String {
     let is_in_word = |c: char| c.is_alphanumeric() || c == '_';
     let (mut shape, mut rest) = (String::with_capacity(message.len()), message);
     while let Some(start) = rest.find(|c: char| c.is_ascii_digit()) {
@@ -131,7 +138,7 @@ fn shape(message: &str) -> String {
         let end = number.find(|c: char| !is_in_word(c) && c != '.').unwrap_or(number.len());
         // A full stop ends the sentence, not the number.
         let (number, after) = number.split_at(number[..end].trim_end_matches('.').len());
-        // The digits of `mps2` are no number; those of `track_7` are one.
+        // The digits of `mps2` are no number; the digit of `track_7` is one.
         let is_number = !shape.ends_with(|c: char| c.is_alphanumeric());
         shape.push_str(if is_number && !names_error(&shape, number, after) { "#" } else { number });
         rest = after;
@@ -215,6 +222,9 @@ mod tests {
             ("panicked at src/lib.rs:12:5: lost", "panicked at src/lib.rs:13:5: lost"),
             ("E12: no map", "E13: no map"),
             ("errno=2", "errno=13"),
+            ("2 tracks are lost", "2 lanes are lost"),
+            ("cannot read /tmp/tmpa1b2c3d4/map.bin", "cannot read /tmp/tmpa1b2c3d4/lanes.bin"),
+            ("status c0000005", "status c00000fd"),
         ] {
             assert_ne!(shape(one), shape(other));
         }
@@ -229,6 +239,12 @@ mod tests {
             (r#"answered "2 tracks""#, r#"answered "1 tracks""#),
             (r#"answered "3tracks""#, r#"answered "14tracks""#),
             ("error: 2 tracks are lost", "error: 11 tracks are lost"),
+            ("1 track is lost", "2 tracks are lost"),
+            (r#"answered "1 track""#, r#"answered "2 tracks""#),
+            ("1 of 4 boxes has no class", "3 of 4 boxes have no class"),
+            ("cannot read /tmp/tmpa1b2c3d4/map.bin", "cannot read /tmp/tmpx_y2z3q9/map.bin"),
+            ("[2026-11-28T12:30:05.123Z] lost", "[2026-11-29T02:31:55.001Z] lost"),
+            ("thread 'main' (4711) is late", "thread 'main' (4712) is late"),
             ("track_7 is lost", "track_12 is lost"),
             ("no object with id 4", "no object with id 5"),
             ("index 4 is out of bounds for size 3", "index 7 is out of bounds for size 2"),

@@ -93,11 +93,10 @@ impl Fingerprint {
     fn of_native(settings: &NativeSettings, folder: Option<&Path>) -> Self {
         let path = folder.map_or_else(|| PathBuf::from(&settings.path), |folder| folder.join(&settings.path));
         let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
-        let stated = settings.probe(folder).unwrap_or_default();
         Self {
             command: settings.text(),
             files: vec![FileHash { name: settings.path.clone(), blake3 }],
-            identity: Identity { name: stated.name, version: stated.version },
+            identity: settings.probe(folder).unwrap_or_default(),
             open_files: Vec::new(),
         }
     }
@@ -150,7 +149,7 @@ fn hashes(files: Vec<(String, PathBuf)>) -> Vec<FileHash> {
     files.into_iter().map(hash).collect()
 }
 
-/// Returns the files that a perception program names, each as it is named and with its path: those of its command, or its library.
+/// Returns the files that a perception program names, each as it is named and with its path: the files of its command, or its library.
 pub fn program_files(program: &ProgramSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     match program.kind {
         ProgramKind::Exec => named_files(&command_settings(program), folder),

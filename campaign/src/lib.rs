@@ -74,6 +74,7 @@ pub mod stop;
 pub mod summary;
 mod trust;
 pub mod validity;
+mod variable_words;
 pub mod verdict;
 pub mod wall_times;
 pub mod workers;

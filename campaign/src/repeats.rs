@@ -16,17 +16,23 @@ use super::record::Record;
 /// Smallest spread of a parameter that varies, as a share of its values (-): an assumption; 1e-4 to
 /// 1e-2 are plausible. No measurement of traffic tells a thousandth apart.
 const LEAST_SPREAD: f64 = 1e-3;
+/// Smallest spread of a parameter that varies, in its unit: an assumption; 1e-7 to 1e-5 are
+/// plausible. A curvature of 1e-6 1/m is a radius of 1,000 km, and no other unit of a scenario is
+/// finer. Around zero, a share of the values is no scale.
+const LEAST_AMOUNT: f64 = 1e-6;
 /// The quantiles between which the spread of a parameter is taken.
 const SPREAD: [f64; 2] = [0.05, 0.95];
 
-/// Returns true if some parameter varies, and by more than [`LEAST_SPREAD`].
+/// Returns true if some parameter varies, and by more than [`LEAST_SPREAD`] and [`LEAST_AMOUNT`].
 pub(crate) fn is_varied(space: &ParameterSpace) -> bool {
     space.varying().any(|(_, entry)| spreads(entry))
 }
 
 fn spreads(entry: &SpaceEntry) -> bool {
     match SPREAD.map(|u| entry.distribution.quantile(u)) {
-        [Value::Number(low), Value::Number(high)] => high - low > LEAST_SPREAD * low.abs().max(high.abs()),
+        [Value::Number(low), Value::Number(high)] => {
+            high - low > (LEAST_SPREAD * low.abs().max(high.abs())).max(LEAST_AMOUNT)
+        }
         _ => true,
     }
 }
@@ -139,6 +145,8 @@ mod tests {
         assert!(!is_varied_between(30.0, 30.000_001));
         assert!(!is_varied_between(30.0, 30.02));
         assert!(is_varied_between(30.0, 30.2));
-        assert!(is_varied_between(0.0, 1e-6), "around zero there is no scale");
+        assert!(!is_varied_between(0.0, 1e-6), "around zero a share is no scale");
+        assert!(!is_varied_between(-1e-7, 1e-7));
+        assert!(is_varied_between(0.0, 1e-4), "a curvature in 1/m");
     }
 }

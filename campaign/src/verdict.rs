@@ -6,8 +6,8 @@
 //! | a validity check failed, or what a scenario expects did not happen | [`Decision::Invalid`] | INVALID | 7 |
 //! | a gate or the check of a requirement is not met, or more samples are flaky than allowed | [`Decision::Fail`] | FAIL | 1 |
 //! | the samples do not decide a gate | [`Decision::Inconclusive`] | INCONCLUSIVE | 4 |
-//! | no gate and no requirement was checked, or the system under test was not there to be tested | [`Decision::NotJudged`] | NOT JUDGED | 4 |
-//! | `--set` weakened what a scenario is judged by | [`Decision::Overridden`] | OVERRIDDEN | 4 |
+//! | no gate and no requirement was checked, in some scenario none on the system under test, or that system was not there to be tested | [`Decision::NotJudged`] | NOT JUDGED | 4 |
+//! | a setting, a gate or the baseline weakened what a file demands | [`Decision::Overridden`] | OVERRIDDEN | 4 |
 //! | every gate that was checked is met | [`Decision::Pass`] | PASS | 0 |
 //! | the campaign is a measurement (`--no-gate`) | [`Decision::Measured`] | none | 0 |
 //!
@@ -45,11 +45,11 @@ pub enum Verdict {
     /// The samples do not decide a gate.
     #[serde(rename = "INCONCLUSIVE")]
     Inconclusive,
-    /// No gate and no requirement was checked, or the system under test was not available or never
-    /// acted.
+    /// No gate and no requirement was checked, or in some scenario none on the system under test, or
+    /// that system was not available or never acted.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
-    /// A setting of the command line weakened the criteria of a scenario.
+    /// A setting, a gate or the baseline of the command line weakened the criteria of a file.
     #[serde(rename = "OVERRIDDEN")]
     Overridden,
     /// Some sample ended in an error.
@@ -293,6 +293,15 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
                 false => "no gate was set, and not every check of the requirements is decided",
             };
             findings.add(Decision::NotJudged, missing.to_owned());
+        } else {
+            let is_bounded = |name: &str| probabilities.iter().any(|(bounded, _)| bounded == name);
+            for name in unjudged(judge, &gates).filter(|name| !is_bounded(name)) {
+                let reason = format!(
+                    "{name}: no gate and no check of a requirement judges the system under test there: set a gate on it, or leave the \
+                     scenario out"
+                );
+                findings.add(Decision::NotJudged, reason);
+            }
         }
         Decision::first_of(&findings.decisions()).unwrap_or(Decision::Pass)
     };
@@ -311,6 +320,11 @@ fn undecidable(gates: &[GateResult]) -> BTreeSet<String> {
     let decided: BTreeSet<String> =
         set().filter(|gate| gate.standing() != Standing::NotChecked).map(subjects).collect();
     set().map(subjects).filter(|subject| !decided.contains(subject)).collect()
+}
+
+/// Returns the scenarios in which no gate and no check of a requirement judges the arm under test.
+fn unjudged<'a>(judge: &'a Judge, gates: &'a [GateResult]) -> impl Iterator<Item = &'a str> {
+    judge.scenarios().filter(move |name| !gates.iter().any(|gate| gate.scenario == *name && gate.judges_tested()))
 }
 
 /// Returns true if the gates say something: a gate that somebody set is decided, or every check of

@@ -20,7 +20,7 @@
  *
  * Times are in s, lengths in m, speeds in m/s, accelerations in m/s^2, angles in rad. x points ahead of the ego, y to its left.
  *
- * The interface is that of CLOSECALL_CONTROLLER_ABI. Any change of it changes that number, and Closecall refuses a library of a
+ * CLOSECALL_CONTROLLER_ABI is the version of the interface. Any change of the interface changes it, and Closecall refuses a library of a
  * number that it does not know. */
 #ifndef CLOSECALL_CONTROLLER_H
 #define CLOSECALL_CONTROLLER_H
@@ -85,8 +85,8 @@ typedef struct {
     int32_t status;    /* CLOSECALL_TRACK_... */
     uint32_t reserved; /* 0 */
     double time_s;     /* time of the state (s) */
-    double x_m;        /* centre of the vehicle ahead of that of the ego (m) */
-    double y_m;        /* centre of the vehicle to the left of that of the ego (m) */
+    double x_m;        /* centre of the vehicle ahead of the ego's centre (m) */
+    double y_m;        /* centre of the vehicle to the left of the ego's centre (m) */
     double vx_mps;     /* speed over ground along x (m/s) */
     double vy_mps;     /* speed over ground along y (m/s) */
     double covariance[16]; /* of x, y, vx, vy; row by row; units m^2, m^2/s, m^2/s^2 */
@@ -98,7 +98,7 @@ typedef struct {
     double motorcycle;
     double background;
     double existence;      /* probability that there is a vehicle at all */
-    double lane_left;      /* probabilities of the lane relative to that of the ego */
+    double lane_left;      /* probabilities of the lane relative to the ego's lane */
     double lane_own;
     double lane_right;
 } closecall_track;

@@ -21,7 +21,7 @@
  * Times are in s or ns, lengths in m, speeds in m/s, angles in rad. The frame of the ego has its origin in the middle of the ego on
  * the ground: x points ahead, y to its left, z up. docs/reference/perception.md explains every value.
  *
- * The interface is that of CLOSECALL_PERCEPTION_ABI. Any change of it changes that number, and Closecall refuses a library of a
+ * CLOSECALL_PERCEPTION_ABI is the version of the interface. Any change of the interface changes it, and Closecall refuses a library of a
  * number that it does not know. */
 #ifndef CLOSECALL_PERCEPTION_H
 #define CLOSECALL_PERCEPTION_H
@@ -175,7 +175,7 @@ typedef struct {
     double truck;
     double motorcycle;
     double background;
-    int64_t time_ns;         /* time at which the position holds (ns), at most 0.2 s before the question; that of the question by default */
+    int64_t time_ns;         /* time at which the position holds (ns), at most 0.2 s before the question; by default the time of the question */
     uint32_t points;         /* number of points, at least 1; 0 by default, which is refused */
     uint32_t length_is_seen; /* 1 if the length is measured, 0 (default) if it is assumed */
     uint32_t width_is_seen;  /* the same for the width */
@@ -184,7 +184,7 @@ typedef struct {
 
 /* A track at the time of the question. Closecall sets what has no default to NaN before the call, and the status to -1. */
 typedef struct {
-    uint32_t id;    /* the same for the whole life of a track, another one than that of every other track */
+    uint32_t id;    /* the same for the whole life of a track, unlike the number of any other track */
     int32_t status; /* CLOSECALL_TRACK_... */
     double x_m;     /* centre of the box (m) */
     double y_m;

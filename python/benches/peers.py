@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 
-# Step of SUMO (s): that of Closecall's controller.
+# Step of SUMO (s): the step of Closecall's controller.
 SUMO_STEP_S = 0.04
 # Simulated time of a case of SUMO (s).
 SUMO_S = {3: 1000.0, 60: 100.0}

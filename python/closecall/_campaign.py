@@ -163,7 +163,7 @@ def campaign(
 ) -> CampaignResult:
     """Runs many samples of scenarios, and judges the result, as ``closecall campaign`` does.
 
-    The folder, the verdict and the exit code are those of the command line. ``n`` is the number of samples of each scenario.
+    The folder, the verdict and the exit code are the same as from the command line. ``n`` is the number of samples of each scenario.
     ``controller`` is as in :func:`run`; ``paired`` compares it with ``acc`` on the same samples. ``arms`` names
     several controllers, the baseline first. ``gate`` lists criteria such as ``"upper(induced) <= 0.01"``. ``options`` are
     further keywords such as ``max_collisions=3``, ``sample_timeout_s=10``, ``no_gate=True``; see :class:`CampaignOptions`.
@@ -250,7 +250,7 @@ def campaign(
 
 
 def _several(values: str | os.PathLike[str] | Sequence[str] | None) -> list[str | os.PathLike[str]] | None:
-    """Returns a list of texts, of which one may be given as it is; ``None`` if there are none."""
+    """Returns a list of texts. A single text may be given as it is; ``None`` if there are none."""
     return [values] if isinstance(values, (str, os.PathLike)) else list(values or ()) or None
 
 

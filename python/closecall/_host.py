@@ -54,7 +54,7 @@ class Parcel(NamedTuple):
         content = pickle.dumps((sys.path, self.names, self.library, self.pickled))
         with ExitStack() as ends:
             if sys.platform == "linux":
-                # The system frees it with this process, which may end without notice, as those of Ray do.
+                # The system frees it with this process, which may end without notice, as processes of Ray do.
                 number = os.memfd_create("closecall-controllers")
                 ends.callback(os.close, number)
                 file = Path(f"/proc/{os.getpid()}/fd/{number}")

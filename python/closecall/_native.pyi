@@ -223,7 +223,7 @@ class Track:
         """Covariance of ``x_m``, ``y_m``, ``vx_mps``, ``vy_mps`` (4 × 4)."""
     @property
     def heading_rad(self) -> float:
-        """Heading relative to that of the ego (rad)."""
+        """Heading relative to the ego's heading (rad)."""
     @property
     def length_m(self) -> float:
         """Length (m)."""
@@ -238,7 +238,7 @@ class Track:
         """Probability that the track belongs to a real object."""
     @property
     def lane(self) -> tuple[float, float, float]:
-        """Probabilities of being in the lane left of the ego, in that of the ego, and in that right of it."""
+        """Probabilities of being in the lane left of the ego, in the ego's lane, and in the lane right of it."""
 
 @final
 class ControllerInput:

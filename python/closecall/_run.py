@@ -29,7 +29,7 @@ def run(
 
     ``controller`` is the name of a built-in controller (``"acc"``, ``"mis"``, ``"gap-1.6"`` …), ``"exec:COMMAND"``, an object
     with a method ``step``, or a class or function that creates one. ``sensors`` is the depth of the sensor simulation,
-    by default that of the scenario. ``perception`` takes the place of the built-in chain behind the rear LiDARs in mode ``full``:
+    by default the scenario's. ``perception`` takes the place of the built-in chain behind the rear LiDARs in mode ``full``:
     see :mod:`closecall.perception`. An object runs in a process of its own, and needs ``cloudpickle``.
 
     Raises :class:`SampleError` if the sample has no outcome. Its ``__cause__`` is the exception of the controller.

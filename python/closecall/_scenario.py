@@ -61,7 +61,7 @@ class Scenario:
     ) -> list[dict[str, float | str]]:
         """Returns the parameters of the samples 0 to ``n`` − 1, with the units that their names state.
 
-        They are those of ``campaign(scenario, n=n, seed=seed, design=design)``. A grid may have fewer samples.
+        ``campaign(scenario, n=n, seed=seed, design=design)`` runs the same samples. A grid may have fewer samples.
         """
         return self._native.sample(seed, n, design)
 

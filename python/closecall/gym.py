@@ -105,7 +105,7 @@ def observation_space(max_tracks: int = 16) -> spaces.Dict:
 
 
 def default_reward(observation: Observation, acceleration_mps2: Any, crashed: Any) -> Any:
-    """Returns a reward that needs no truth: an example, to be replaced by that of your question.
+    """Returns a reward that needs no truth: an example, to be replaced by the reward of your question.
 
     Per second it takes 0.05 for each (m/s²)² of the command, and up to 1 for each time headway below 1 s, of the ego to
     its lead vehicle and of the vehicle behind to the ego. A crash, which the ego feels, costs 20. The weights are
@@ -247,7 +247,7 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts a sample: ``options["sample"]`` (from 0), or one that is drawn. ``seed`` is that of the campaign."""
+        """Starts a sample: ``options["sample"]`` (from 0), or one that is drawn. ``seed`` is the seed of the campaign."""
         _check_open(self._is_closed)
         drawn = _sample_of(options)
         super().reset(seed=seed)
@@ -331,7 +331,7 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts a sample in each run. ``seed`` is that of the campaign, or a list with one for each run."""
+        """Starts a sample in each run. ``seed`` is the seed of the campaign, or a list with one for each run."""
         _check_open(self.closed)
         given = _sample_of(options)
         for name, several in (("seed", seed), ("sample", given)):

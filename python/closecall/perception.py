@@ -38,7 +38,10 @@ __all__ = [
     "Tracker",
 ]
 
-#: Probabilities of the classes, whose sum is 1. Those that are left out are 0.
+#: A side of the ego, or of the road.
+Side = Literal["left", "right"]
+
+#: Probabilities of the classes, whose sum is 1. A class that is left out has 0.
 ClassProbabilities = Mapping[Literal["car", "truck", "motorcycle", "background"], float]
 
 
@@ -69,7 +72,7 @@ class Lidar:
 class Radar:
     """A rear radar."""
 
-    side: Literal["left", "right"]
+    side: Side
     #: Mounting in the ego's frame (m).
     x_m: float
     y_m: float
@@ -115,7 +118,7 @@ class Road:
     #: Curvature (1/m), positive to the left.
     curvature_per_m: float
     speed_limit_mps: float
-    overtaking_side: Literal["left", "right"]
+    overtaking_side: Side
 
 
 @dataclass(frozen=True)
@@ -202,7 +205,7 @@ class RadarDetection:
 class RadarScan:
     """A scan of a rear radar."""
 
-    side: Literal["left", "right"]
+    side: Side
     time_ns: int
     detections: tuple[RadarDetection, ...]
 
@@ -257,7 +260,7 @@ class Detection:
     width_is_seen: bool = False
     #: Height of the highest point (m).
     top_m: float = 1.5
-    #: Time at which the position holds, at most 0.2 s before the question; by default that of the question.
+    #: Time at which the position holds, at most 0.2 s before the question; by default the question's time.
     time_ns: int | None = None
     #: By default nothing is known.
     class_probabilities: ClassProbabilities | None = None

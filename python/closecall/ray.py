@@ -54,7 +54,7 @@ def campaign(
 ) -> CampaignResult:
     """Runs a campaign on a Ray cluster. All but ``address`` is as in :func:`closecall.campaign`, and so is the result.
 
-    ``address`` is ``"auto"`` (the cluster of this machine, or that of ``RAY_ADDRESS``), ``"HOST:PORT"``, ``"ray://HOST:PORT"``, or
+    ``address`` is ``"auto"`` (the cluster of this machine, or of ``RAY_ADDRESS``), ``"HOST:PORT"``, ``"ray://HOST:PORT"``, or
     ``"local"`` (a cluster is started on this machine for the campaign). If the program has called ``ray.init``, that cluster is
     used.
 

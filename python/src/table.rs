@@ -109,7 +109,7 @@ pub(crate) fn rows_table(rows: &str) -> PyResult<Table> {
     Ok(batch.into())
 }
 
-/// Returns the column of these values, of which `None` is absent.
+/// Returns the column of these values. `None` is absent.
 fn column(values: &[Option<&Value>]) -> ArrayRef {
     let are = |is: fn(&Value) -> bool| values.iter().flatten().all(|value| is(value));
     if are(Value::is_boolean) {

@@ -81,7 +81,7 @@ fn tracks_stand_beside_the_vehicles_of_the_trace() {
         let [ego_m, _] = truth[&(at, "ego")];
         let [actor_m, actor_mps] = truth[&(at, actor.value(row))];
         assert!((vx_mps.value(row) - error_vx_mps.value(row) - actor_mps).abs() < 0.1);
-        // The errors are those of the nearest face: half of the lengths' difference from those of the centre.
+        // The errors are errors of the nearest face: half of the lengths' difference from the errors of the centre.
         let centre_error_m = x_m.value(row) - (actor_m - ego_m);
         let of_length_m = (centre_error_m - error_x_m.value(row)).abs();
         assert!(of_length_m <= 0.5 * (length_m.value(row) - 4.6).abs() + 0.6, "{of_length_m}");

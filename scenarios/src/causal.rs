@@ -83,8 +83,6 @@ pub struct CausalSentence<'a> {
     pub letters: &'a VehicleLetters,
     /// The faults that were injected.
     pub faults: &'a [StatedFault],
-    /// The time over which the reason of the MIS held (s), if that is known.
-    pub reason_span_s: Option<[f64; 2]>,
     /// The vehicle for which the MIS engaged, in words, if that is known: its letter or name, or that it
     /// does not exist.
     pub engaged_for: Option<&'a str>,
@@ -152,7 +150,7 @@ impl CausalSentence<'_> {
                 let vehicle = self.engaged_for.map_or_else(String::new, |vehicle| format!(" for {vehicle}"));
                 format!("the MIS engaged{vehicle} at {engaged_at_s:.1} s{}", self.engaged(mis, engaged_at_s))
             }
-            Err(_) => format!("the MIS stayed off: {}{}", mis.reason, self.reason_span()),
+            Err(_) => format!("the MIS stayed off: {}", mis.reason_words()),
         };
         Some(format!("{did}{gone}"))
     }
@@ -172,10 +170,6 @@ impl CausalSentence<'_> {
         format!("{when}{gained}{goal}")
     }
 
-    fn reason_span(&self) -> String {
-        self.reason_span_s.map_or_else(String::new, |[from_s, until_s]| format!(", {from_s:.1} to {until_s:.1} s"))
-    }
-
     /// Returns the faults that began before the first collision, or in the run.
     fn faults(&self) -> String {
         let end = self.first().map_or(self.outcome.duration, |collision| collision.time);
@@ -190,8 +184,7 @@ impl CausalSentence<'_> {
 pub fn causal_sentence(scenario: &Scenario, sensors: Option<SensorMode>, outcome: &Outcome) -> String {
     let faults = sensors.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode)).stated_faults();
     let letters = VehicleLetters::of(scenario);
-    let (reason_span_s, engaged_for) = (None, None);
-    CausalSentence { outcome, letters: &letters, faults: &faults, reason_span_s, engaged_for }.to_string()
+    CausalSentence { outcome, letters: &letters, faults: &faults, engaged_for: None }.to_string()
 }
 
 impl CausalSentence<'_> {
@@ -235,7 +228,7 @@ mod tests {
     use closecall_traffic::{Absent, Parameters};
 
     use super::*;
-    use crate::outcome::{ClosedBy, EndReason, Margins, Phase, ReachedMoment};
+    use crate::outcome::{ClosedBy, EndReason, Margins, Phase, ReachedMoment, ReasonSpan};
 
     fn id(name: &str) -> ActorId {
         ActorId::new(name).unwrap()
@@ -303,8 +296,8 @@ mod tests {
         }
     }
 
-    fn sentence(outcome: &Outcome, faults: &[StatedFault], reason_span_s: Option<[f64; 2]>) -> String {
-        CausalSentence { outcome, letters: &letters(), faults, reason_span_s, engaged_for: None }.to_string()
+    fn sentence(outcome: &Outcome, faults: &[StatedFault]) -> String {
+        CausalSentence { outcome, letters: &letters(), faults, engaged_for: None }.to_string()
     }
 
     #[test]
@@ -341,15 +334,17 @@ mod tests {
         let rear_end = collision(["ego", "rear"], [BoxSide::Rear, BoxSide::Front], ClosedBy::Second);
         let moments = vec![reached(Moment::FrontBrakes, 9_000, "left-2")];
         let run = Outcome { moments, ..outcome(vec![rear_end], Reason::PassingLaneOccupied) };
-        assert!(sentence(&run, &[], None).contains(", 4.5 s after left-2 braked; "), "{}", sentence(&run, &[], None));
+        assert!(sentence(&run, &[]).contains(", 4.5 s after left-2 braked; "), "{}", sentence(&run, &[]));
     }
 
     #[test]
     fn the_sentence_says_who_struck_whom_after_what_and_why_the_system_did_not_act() {
         let rear_end = collision(["ego", "rear"], [BoxSide::Rear, BoxSide::Front], ClosedBy::Second);
-        let run = outcome(vec![rear_end], Reason::PassingLaneOccupied);
+        let mut run = outcome(vec![rear_end], Reason::PassingLaneOccupied);
+        run.mis.as_mut().unwrap().reasons =
+            vec![ReasonSpan { reason: Reason::PassingLaneOccupied, from_s: 3.6, until_s: 9.6 }];
         assert_eq!(
-            sentence(&run, &[], Some([3.6, 9.6])),
+            sentence(&run, &[]),
             "R struck E from behind at 9.2 m/s (ΔV R 5.2, E 5.1 m/s) at 13.50 s, 4.5 s after F braked; the MIS stayed off: passing \
              lane occupied, 3.6 to 9.6 s; faults: none"
         );
@@ -359,11 +354,8 @@ mod tests {
     fn an_engagement_for_a_vehicle_that_does_not_exist_says_so() {
         let mut run = outcome(Vec::new(), Reason::Engaged);
         run.mis.as_mut().unwrap().engaged_at_s = Ok(2.0);
-        let told = |engaged_for| {
-            let sentence =
-                CausalSentence { outcome: &run, letters: &letters(), faults: &[], reason_span_s: None, engaged_for };
-            sentence.reason()
-        };
+        let told =
+            |engaged_for| CausalSentence { outcome: &run, letters: &letters(), faults: &[], engaged_for }.reason();
         assert_eq!(
             told(Some("a vehicle that does not exist")),
             "the MIS engaged for a vehicle that does not exist at 2.0 s, 7.0 s before F braked; faults: none"
@@ -375,7 +367,7 @@ mod tests {
     fn sides_and_other_vehicles_have_words() {
         let struck = |between, sides, closed_by| {
             let run = outcome(vec![collision(between, sides, closed_by)], Reason::NoRear);
-            sentence(&run, &[], None).split(" at ").next().unwrap().to_owned()
+            sentence(&run, &[]).split(" at ").next().unwrap().to_owned()
         };
         use BoxSide::{Front, Left, Rear, Right};
         use ClosedBy::{Both, First, Second};
@@ -396,13 +388,13 @@ mod tests {
         };
         let rear_end = collision(["ego", "rear"], [BoxSide::Rear, BoxSide::Front], ClosedBy::Second);
         let run = outcome(vec![rear_end], Reason::RearSensorsFailed);
-        let end = |faults: &[StatedFault]| sentence(&run, faults, None).split("; faults: ").nth(1).unwrap().to_owned();
+        let end = |faults: &[StatedFault]| sentence(&run, faults).split("; faults: ").nth(1).unwrap().to_owned();
         assert_eq!(end(&[fault(2.0)]), "rear LiDAR dead from 2.0 s on");
         assert_eq!(end(&[fault(14.0)]), "none");
         assert_eq!(end(&[fault(f64::NEG_INFINITY), fault(14.0)]), "rear LiDAR dead");
         let harmless = outcome(vec![], Reason::RearSensorsFailed);
         assert_eq!(
-            sentence(&harmless, &[fault(14.0)], None),
+            sentence(&harmless, &[fault(14.0)]),
             "no vehicle collided; F braked at 9.00 s; the MIS stayed off: not available: rear sensors failed; faults: rear LiDAR \
              dead from 14.0 s on"
         );

@@ -85,7 +85,7 @@ pub struct ScenarioConfig {
     /// The ego's sensors.
     #[serde(default)]
     pub sensors: SensorsConfig,
-    /// The sample whose random numbers every run uses, instead of those of its own seed and number.
+    /// The sample whose random numbers every run uses, instead of its own seed and number.
     /// For cases that were made from a sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub random_numbers: Option<RandomNumbersConfig>,
@@ -142,7 +142,7 @@ const fn default_expects_share() -> f64 {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ControllerConfig {
-    /// The names of the variables of an FMU, if they are not those of the quantities.
+    /// The names of the variables of an FMU, if they differ from the names of the quantities.
     #[serde(default)]
     pub fmu: VariableTable,
 }

@@ -272,7 +272,8 @@ impl ScenarioFile {
         Ok(Self { trajectory_files, settings, unused, program_folder, ..Self::parse(&self.path, text, &[])? })
     }
 
-    /// Returns the same file, whose perception program runs in this folder. A folder whose name is not UTF-8 is that of this program.
+    /// Returns the same file, whose perception program runs in this folder. If the name of the folder is not UTF-8, the program
+    /// runs in the folder of this process.
     #[must_use]
     pub fn with_program_in(self, folder: Option<&Path>) -> Self {
         Self { program_folder: folder.and_then(Path::to_str).map(str::to_owned), ..self }

@@ -69,12 +69,12 @@ pub struct IdealConfig {
     /// The rear LiDAR measures every vehicle in its line of sight, without noise, losses or
     /// weather. Sensor mode `full`.
     pub points: bool,
-    /// The points of each vehicle form one cluster, whose box is that of the vehicle. Sensor mode
+    /// The points of each vehicle form one cluster, whose box is the vehicle's. Sensor mode
     /// `full`.
     pub clusters: bool,
     /// The class of every vehicle behind the ego is known.
     pub class: bool,
-    /// The tracks are those of the true vehicles, as late as those of the sensors.
+    /// The tracks are the true vehicles, as late as the tracks of the sensors.
     pub tracks: bool,
     /// Sensors and trackers need no time.
     pub timing: bool,

@@ -312,6 +312,28 @@ pub struct MisSummary {
     pub unavailable: Option<Unavailability>,
 }
 
+impl MisSummary {
+    /// Returns the longest time without a break over which the stated reason held in `decided_s`, or in the run if no
+    /// vehicle behind met the conditions (s). `None` if it held for no time.
+    pub fn reason_span_s(&self) -> Option<[f64; 2]> {
+        let [from_s, until_s] = self.decided_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let spans = self.reasons.iter().filter(|span| span.reason == self.reason);
+        let held = spans.map(|span| [span.from_s.max(from_s), span.until_s.min(until_s)]);
+        let lasted_s = |span: &[f64; 2]| span[1] - span[0];
+        held.filter(|span| lasted_s(span) > 0.0).max_by(|a, b| lasted_s(a).total_cmp(&lasted_s(b)))
+    }
+
+    /// Returns the reason in words, and over which time it held if the system never engaged: *passing lane occupied, 3.6
+    /// to 9.6 s*. A controller that gives no reason of this program has no such time.
+    pub fn reason_words(&self) -> String {
+        let says_nothing = self.engaged_at_s.is_ok() || self.reason == Reason::External;
+        match self.reason_span_s().filter(|_| !says_nothing) {
+            Some([from_s, until_s]) => format!("{}, {from_s:.1} to {until_s:.1} s", self.reason),
+            None => self.reason.to_string(),
+        }
+    }
+}
+
 /// The method's promise, from the true states, in every arm.
 ///
 /// The promise: when the vehicle behind is at the critical distance, the front time headway has
@@ -498,6 +520,41 @@ mod tests {
         ];
         assert_eq!(longest_reason(&spans, [0.0, 3.5]), Some(Reason::RearUnconfirmed));
         assert_eq!(longest_reason(&spans, [0.5, 3.0]), Some(Reason::RearNotApproaching), "only the interval counts");
+    }
+
+    #[test]
+    fn the_time_of_the_reason_is_its_longest_one_in_which_the_system_could_have_engaged() {
+        let never = Err(Absent::NeverEngaged);
+        let mut mis = MisSummary {
+            engaged_at_s: never,
+            released_at_s: never,
+            thw_front_at_engagement_s: never,
+            thw_front_at_critical_s: never,
+            mean_deceleration_mps2: never,
+            goal_in_reach: None,
+            reason: Reason::PassingLaneOccupied,
+            reasons: vec![
+                span(Reason::PassingLaneOccupied, 0.0, 3.0),
+                span(Reason::RearFar, 3.0, 3.2),
+                span(Reason::PassingLaneOccupied, 3.2, 9.6),
+                span(Reason::BrakingRequired, 9.6, 30.0),
+            ],
+            decided_s: Some([3.6, 12.0]),
+            unavailable: None,
+        };
+        assert_eq!(mis.reason_words(), "passing lane occupied, 3.6 to 9.6 s", "not from 0 s, and not until 30 s");
+        mis.decided_s = None;
+        assert_eq!(mis.reason_words(), "passing lane occupied, 3.2 to 9.6 s");
+        // Before it could have engaged, and at an instant, the reason held for no time.
+        mis.decided_s = Some([9.6, 12.0]);
+        assert_eq!(mis.reason_words(), "passing lane occupied");
+        mis.decided_s = None;
+        mis.engaged_at_s = Ok(2.0);
+        assert_eq!(mis.reason_words(), "passing lane occupied", "an engagement has a time of its own");
+        mis.engaged_at_s = never;
+        mis.reason = Reason::External;
+        mis.reasons = vec![span(Reason::External, 0.0, 30.0)];
+        assert_eq!(mis.reason_words(), "the controller's own reason");
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! and a replay know them as well.
 
 use super::ScenarioConfig;
-use crate::criteria::{Aggregate, Expression, GateConfig, Operator};
+use crate::criteria::{Aggregate, Expression, GateConfig};
 
 /// The key of the text that names the weakened demands.
 pub(super) const KEY: &str = "overridden";
@@ -19,10 +19,10 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     let mut found = before.overridden.clone();
     for (mark, asked) in &before.checks {
         let kept = after.checks.get(mark).map_or(&[][..], Vec::as_slice);
-        let is_kept = |old: &Expression| kept.iter().any(|new| is_as_strict(new, old));
+        let is_kept = |old: &Expression| kept.iter().any(|new| new.is_as_strict_as(old));
         found.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
     }
-    let is_gate_kept = |old: &&Expression| after.gate.require.iter().any(|new| is_as_strict(new, old));
+    let is_gate_kept = |old: &&Expression| after.gate.require.iter().any(|new| new.is_as_strict_as(old));
     found.extend(before.gate.require.iter().filter(|old| !is_gate_kept(old)).map(|old| format!("gate {old}")));
     found.extend(weaker_probability(&before.gate, &after.gate));
     let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
@@ -50,14 +50,6 @@ fn weaker_probability(before: &GateConfig, after: &GateConfig) -> Option<String>
     let confidence = |gate: &GateConfig| gate.confidence.unwrap_or(CONFIDENCE);
     let is_kept = after.max_probability.is_some_and(|new| new <= max) && confidence(after) >= confidence(before);
     (!is_kept).then(|| format!("gate max-probability {max}"))
-}
-
-fn is_as_strict(new: &Expression, old: &Expression) -> bool {
-    let is_bound_kept = match old.operator {
-        Operator::AtMost => new.bound <= old.bound,
-        Operator::AtLeast => new.bound >= old.bound,
-    };
-    new.subject() == old.subject() && new.operator == old.operator && is_bound_kept
 }
 
 #[cfg(test)]

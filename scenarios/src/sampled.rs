@@ -54,7 +54,7 @@ use super::{ScenarioError, ScenarioFile, Setting};
 const EGO_DISTANCE_M: f64 = 250.0;
 /// Time gap of the ego's adaptive cruise control (s). The ego never comes close enough to use it.
 const EGO_TIME_GAP_S: f64 = 1.8;
-/// Shortest times between two points of a lateral path (s), of which the first suitable one is taken:
+/// Shortest times between two points of a lateral path (s). The first suitable one is taken:
 /// assumptions. A lane change takes several seconds.
 const PATH_STEPS_S: [f64; 5] = [0.5, 0.75, 1.0, 1.5, 2.0];
 /// Shortest distance between two points of a lateral path (m): an assumption, 1 to 5 are plausible.

@@ -88,7 +88,7 @@ pub fn skipped(paths: &[PathBuf]) -> Vec<PathBuf> {
     files.filter(|path| !may_be_scenario(path)).collect()
 }
 
-/// Returns the TOML files in a folder, then those of its folders.
+/// Returns the TOML files in a folder, then the files of its folders.
 fn all_toml_files(folder: &Path) -> Result<Vec<PathBuf>, ScenarioError> {
     let mut files = toml_files(folder)?;
     append_below(folder, &mut files)?;

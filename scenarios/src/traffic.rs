@@ -45,7 +45,7 @@ const ROUNDING_M: f64 = 1e-6;
 pub struct TrafficConfig {
     /// Beginning of the vehicles' names: lower-case letters, digits and hyphens.
     pub id: ActorId,
-    /// The number from which everything is drawn (-): that of a parameter with a uniform
+    /// The number from which everything is drawn (-): a parameter with a uniform
     /// distribution from 0 to 1 gives other traffic in each sample, a fixed number the same.
     pub draw: Num,
     /// The lanes, counted from 1 for the leftmost lane. The vehicles are dealt to them in turn.

@@ -21,7 +21,7 @@ use crate::{
     TrackerConfig,
 };
 
-/// Default number of core points of DBSCAN, that of `ClusteredPoints::CORE_POINTS`.
+/// Default number of core points of DBSCAN, as `ClusteredPoints::CORE_POINTS`.
 const DEFAULT_CORE_POINTS: u8 = 3;
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).

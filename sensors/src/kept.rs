@@ -1,4 +1,4 @@
-//! Texts that are kept until the process ends, such as commands and paths of scenarios.
+//! Texts that are kept until the process ends, such as commands and names of sensors.
 
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The processing latency is L whole control steps. The tracks are predicted by the latency to the
-//! present. A sensor whose rate is below that of the control loop scans in some of the steps only;
+//! present. A sensor that is slower than the control loop scans in some of the steps only;
 //! in the other steps its tracks are predicted further.
 //!
 //! Several sensors share the tracker, not the clusters: each scan is clustered on its own, in the

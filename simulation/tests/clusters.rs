@@ -1,9 +1,10 @@
-//! The clusters of the LiDAR in all scenarios of the library are those of the definition of DBSCAN,
+//! The clusters of the LiDAR in all scenarios of the library follow the definition of DBSCAN,
 //! with either implementation.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use closecall_scenarios::source::expand;
 use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
 use closecall_sensors::lidar::ClusteredPoints;
@@ -46,24 +47,6 @@ impl Observer for Comparison {
     }
 }
 
-/// Returns the scenario files in a folder and its subfolders. A file without a duration or a base is no scenario.
-fn scenarios(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            files.append(&mut scenarios(&path));
-        } else if path.extension().is_some_and(|end| end == "toml") {
-            let text = std::fs::read_to_string(&path).unwrap();
-            if text.lines().any(|line| line.starts_with("duration-s") || line.starts_with("base")) {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
-    files
-}
-
 /// Returns the nominal scenario of a file with these settings.
 fn nominal(path: &Path, settings: &[Setting]) -> Result<Scenario, ScenarioError> {
     let file = ScenarioFile::load(path, settings)?;
@@ -73,7 +56,7 @@ fn nominal(path: &Path, settings: &[Setting]) -> Result<Scenario, ScenarioError>
 #[test]
 fn the_clusters_of_the_library_are_those_of_the_definition() {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
-    let files = scenarios(&library);
+    let files = expand(&[library]).unwrap();
     assert!(files.len() > 90, "{files:?}");
     let mut comparison = Comparison::default();
     for path in files {

@@ -89,7 +89,7 @@ pub(super) struct AerialArgs {
     #[arg(long, value_name = "S", default_value_t = FlightOptions::default().reach_s, help_heading = heading::METHOD)]
     around_s: f64,
     /// Standard deviation, along each axis, of the constant error of georeferencing in m, 0 to 5. With
-    /// 0, what is left of a bias is that of the detector and the correction
+    /// 0, what is left of a bias comes from the detector and the correction
     #[arg(long, value_name = "M", default_value_t = FlightOptions::default().offset_sigma_m, help_heading = heading::METHOD)]
     georeferencing_m: f64,
     /// Seed of the errors of georeferencing, the bodies and paints of the vehicles, and the ground. Each

@@ -92,7 +92,11 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
 fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<ExitCode, CliError> {
     let (before, current) = (Baseline::read(file)?, Baseline::of(&Folder::open(dir))?);
     let comparison = before.compare(&current, tolerance)?;
-    let code = if comparison.is_regression() { ExitCode::Fail } else { ExitCode::Pass };
+    let code = match comparison.is_regression() {
+        true => ExitCode::Fail,
+        false if comparison.is_compared() => ExitCode::Pass,
+        false => ExitCode::SampleError,
+    };
     match format {
         Format::Json => {
             let object = json!({
@@ -105,7 +109,7 @@ fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<Ex
         }
         Format::Human => {
             print_text(BaselineText(&comparison));
-            if !comparison.is_regression() && (comparison.has_fixed() || !comparison.new_scenarios.is_empty()) {
+            if code == ExitCode::Pass && (comparison.has_fixed() || !comparison.new_scenarios.is_empty()) {
                 outln!("`closecall baseline save DIR {}` keeps this result", file.display());
             }
         }

@@ -33,6 +33,7 @@ use closecall_report::heartbeat::{Heartbeat, duration_text, rate_text};
 use closecall_report::json;
 use closecall_scenarios::{Function, ScenarioFile};
 use closecall_simulation::controller::ControllerChoice;
+use closecall_studies::fidelity::Fidelity;
 use closecall_traffic::words::counted;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::{Deserialize, Deserializer};
@@ -661,6 +662,10 @@ pub(super) fn carry_out(
     results.lose(resumption.lost);
     let wall_s = started.elapsed().as_secs_f64();
     let mut ending = session::received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule));
+    if let Some(folder) = results.complete().filter(|_| progress.new > 0) {
+        // Rates of the samples before, which the companion estimates anew if it is to.
+        Fidelity::remove(folder)?;
+    }
     if let Some(folder) = results.complete().filter(|_| ending.is_none()) {
         companion.end(folder)?;
         // A signal also stops the samples that the command runs beside the campaign.
@@ -726,6 +731,8 @@ struct Progress {
     simulated_s: f64,
     /// Number of samples that were read from the journal.
     resumed: u64,
+    /// Number of samples that have just been run.
+    new: u64,
     _heartbeat: Option<Heartbeat>,
 }
 
@@ -752,6 +759,7 @@ impl Progress {
             spent: SpentTime::default(),
             simulated_s: 0.0,
             resumed: 0,
+            new: 0,
             _heartbeat: heartbeat(&bar),
             bar,
         }
@@ -782,6 +790,7 @@ impl Progress {
         session::report(self.bar.position(), self.bar.length().unwrap_or_default());
         self.spent += next.spent;
         if next.is_new {
+            self.new += 1;
             let outcomes = next.record.arms.iter().filter_map(|arm| arm.result.as_ref().ok());
             self.simulated_s += outcomes.map(|outcome| outcome.duration.s()).sum::<f64>();
         } else {

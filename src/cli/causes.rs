@@ -63,7 +63,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
     let saved = args.saved.open(&args.dir)?;
     saved.check_trust()?;
     match args.sample {
-        // All failures are those of all samples.
+        // All failures are the failures of all samples.
         None => saved.folder().complete_records()?.try_for_each(|record| record.map(drop))?,
         Some(_) => saved.folder().check_journal()?,
     }

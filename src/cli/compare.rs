@@ -52,7 +52,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let regression = Regression::of(&scenarios, args.max_newly_failing, args.tolerance);
     let code = match regression {
         Regression::None => ExitCode::Pass,
-        Regression::NewErrors => ExitCode::SampleError,
+        Regression::NewErrors | Regression::NotCompared => ExitCode::SampleError,
         Regression::Worse => ExitCode::Fail,
     };
     match args.format {

@@ -18,6 +18,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use closecall_campaign::execution::CampaignError;
+use closecall_campaign::failures::Failures;
 use closecall_campaign::folder::{FAST_SAMPLES, Folder, LockedFolder, MANIFEST};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::merge::Parts;
@@ -136,6 +137,8 @@ pub(super) struct FastSamples<'a> {
     kept: Option<(LockedFolder, Manifest)>,
     /// Number of fast samples that are done.
     done: u64,
+    /// Why fast samples have no outcome, scenario by scenario.
+    failures: Vec<Failures>,
     /// The rates, and their text.
     rates: Option<(Fidelity, String)>,
 }
@@ -144,7 +147,8 @@ impl<'a> FastSamples<'a> {
     /// Plans the fast samples of a campaign.
     pub(super) fn new(choice: FidelityChoice, planned: &Planned<'a>) -> Result<Self, CliError> {
         let plan = choice.plan(planned.plan)?;
-        Ok(Self { plan, ray: planned.ray, retry_errors: planned.end.retry_errors, kept: None, done: 0, rates: None })
+        let retry_errors = planned.end.retry_errors;
+        Ok(Self { plan, ray: planned.ray, retry_errors, kept: None, done: 0, failures: Vec::new(), rates: None })
     }
 }
 
@@ -170,9 +174,11 @@ impl Companion for FastSamples<'_> {
         print_error(format_args!("{samples} with the sensors `{mode}`\n"));
         let bar = progress_bar(campaign.len());
         let heartbeat = heartbeat(&bar);
-        let done = &mut self.done;
+        let (done, failures) = (&mut self.done, &mut self.failures);
+        failures.resize(campaign.works.len(), Failures::default());
         let resumption = campaign.run(Some(locked), |next| {
             *done += 1;
+            failures[next.work].push(next.record);
             bar.inc(1);
             session::report(bar.position(), bar.length().unwrap_or_default());
             if !next.is_new {
@@ -185,6 +191,12 @@ impl Companion for FastSamples<'_> {
         bar.finish_and_clear();
         for message in resumption.messages() {
             print_error(format_args!("{FAST_SAMPLES}: {message}\n"));
+        }
+        // The rates leave these samples out.
+        for (work, failures) in campaign.works.iter().zip(&self.failures) {
+            for failure in failures.iter() {
+                print_error(format_args!("{FAST_SAMPLES}: {}: {failure}\n", work.file.config().name));
+            }
         }
         if campaign.stop.is_set() || manifest.partition.is_some() {
             return Ok(());

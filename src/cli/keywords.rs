@@ -18,7 +18,7 @@ use super::argument::Argument;
 /// The begin of a field's name whose keywords stand beside the others.
 const GROUP: &str = "..";
 
-/// The words of serde for what is expected, and those of a user.
+/// The words of serde for what is expected, and a user's words.
 const EXPECTED: [(&str, &str); 10] = [
     ("u64", "a whole number, 0 or more"),
     ("u32", "a whole number, 0 or more"),
@@ -31,7 +31,7 @@ const EXPECTED: [(&str, &str); 10] = [
     ("a string", "a text"),
     ("string or map", "a text"),
 ];
-/// The words of serde for the value that is there, and those of a user. A word that a value follows
+/// The words of serde for the value that is there, and a user's words. A word that a value follows
 /// is left out.
 const GIVEN: [(&str, &str); 9] = [
     ("integer ", ""),

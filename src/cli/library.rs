@@ -21,6 +21,10 @@ const MEMBERS: &str = "members";
 const LEAST_QUESTION: usize = 30;
 /// The tag of a scenario that injects a fault.
 const FAULT_TAG: &str = "fault";
+/// The tag of a scenario that repeats another one without its hazard, and is named after it.
+const TWIN_TAG: &str = "twin";
+/// The tags of scenarios about other functions than the margin increase system.
+const OTHER_FUNCTIONS: [&str; 2] = ["acc", "aeb"];
 
 /// Arguments of `closecall list`.
 #[derive(Debug, Args)]
@@ -31,8 +35,8 @@ const FAULT_TAG: &str = "fault";
 ]))]
 pub(super) struct ListArgs {
     /// Describe these scenarios in full: part of their names, one of their tags or requirements, in
-    /// any case, `faults`, or the `members` of the driver ensemble [default: a line for each scenario
-    /// without a fault]
+    /// any case, `faults`, or the `members` of the driver ensemble [default: the scenarios without a
+    /// fault, a line each]
     what: Option<String>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -44,9 +48,7 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
     let wanted = args.what.as_deref().map(str::to_lowercase);
     match (args.format, wanted.as_deref()) {
         (Format::Json, _) => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
-        (Format::Human, None) => {
-            overview(&listed, &members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>())
-        }
+        (Format::Human, None) => Overview::of(&listed).print(),
         (Format::Human, Some(MEMBERS)) => {
             members.iter().for_each(|member| print_text(format_args!("{}\n", member.to_string().trim_end())));
             outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
@@ -76,27 +78,91 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-fn is_fault(scenario: &LibraryEntry) -> bool {
-    scenario.tags.iter().any(|tag| tag == FAULT_TAG)
+fn has_tag(scenario: &LibraryEntry, tag: &str) -> bool {
+    scenario.tags.iter().any(|own| own == tag)
 }
 
-/// Prints a line for each scenario without a fault, and how many others there are.
-fn overview(listed: &[LibraryEntry], members: &[&str]) {
-    let (faults, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) = listed.iter().partition(|entry| is_fault(entry));
-    let width = plain.iter().map(|scenario| scenario.name.len()).max().unwrap_or(0);
-    let has_room = output_columns().is_none_or(|columns| columns >= width + LEAST_QUESTION);
-    for scenario in &plain {
-        let question = scenario.question.replace("the margin increase system", "the MIS");
-        let line = if has_room { format!("{:width$}  {question}", scenario.name) } else { scenario.name.to_owned() };
-        outln!("{}", cut(&line));
+fn is_fault(scenario: &LibraryEntry) -> bool {
+    has_tag(scenario, FAULT_TAG)
+}
+
+/// The overview of the library. It fits a terminal of 24 rows with its prompt.
+struct Overview<'a> {
+    /// The scenarios of the margin increase system without a fault. A twin is named beside its scenario: *ramp-merges
+    /// [-without-merge]*.
+    rows: Vec<(String, &'a LibraryEntry)>,
+    /// How to list the others.
+    notes: Vec<String>,
+}
+
+impl<'a> Overview<'a> {
+    fn of(listed: &'a [LibraryEntry]) -> Self {
+        let (faults, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) =
+            listed.iter().partition(|entry| is_fault(entry));
+        let is_of_other = |entry: &&LibraryEntry| OTHER_FUNCTIONS.iter().any(|tag| has_tag(entry, tag));
+        let (others, plain): (Vec<&LibraryEntry>, Vec<&LibraryEntry>) = plain.into_iter().partition(is_of_other);
+        // What a twin adds to the name of a scenario.
+        let added = |twin: &LibraryEntry, scenario: &LibraryEntry| -> Option<&'static str> {
+            let is_pair = has_tag(twin, TWIN_TAG) && !has_tag(scenario, TWIN_TAG);
+            twin.name.strip_prefix(scenario.name).filter(|added| is_pair && added.starts_with('-'))
+        };
+        let is_beside = |entry: &LibraryEntry| plain.iter().any(|scenario| added(entry, scenario).is_some());
+        let name = |scenario: &LibraryEntry| match plain.iter().find_map(|twin| added(twin, scenario)) {
+            Some(added) => format!("{} [{added}]", scenario.name),
+            None => scenario.name.to_owned(),
+        };
+        let rows = plain.iter().filter(|entry| !is_beside(entry)).map(|entry| (name(entry), *entry)).collect();
+        let others: Vec<&str> = others.iter().map(|entry| entry.name).collect();
+        let notes = vec![
+            format!("Other functions of the ego: {}", others.join(", ")),
+            format!("[-…]: twin without the hazard. {} inject a fault: `closecall list {FAULTS}`.", faults.len()),
+            format!("One in full: `closecall list NAME`. Drivers: `closecall list {MEMBERS}`."),
+        ];
+        Self { rows, notes }
     }
-    print_text(format_args!(
-        "{} more inject a fault: `closecall list {FAULTS}`. `closecall list NAME` describes one in full.\n",
-        faults.len()
-    ));
-    print_text(format_args!("Members of the driver ensemble (`closecall list {MEMBERS}`): {}\n", members.join(", ")));
-    print_text(format_args!(
-        "A command takes a name in place of a file: `closecall run {}`. `closecall new NAME --from LIBRARY_NAME` writes a copy.\n",
-        plain.first().map_or("paper-figure", |first| first.name)
-    ));
+
+    fn print(&self) {
+        let width = self.rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        let has_room = output_columns().is_none_or(|columns| columns >= width + LEAST_QUESTION);
+        for (name, scenario) in &self.rows {
+            let question = scenario.question.replace("the margin increase system", "the MIS");
+            let line = if has_room { format!("{name:width$}  {question}") } else { name.clone() };
+            outln!("{}", cut(&line));
+        }
+        self.notes.iter().for_each(|note| print_text(format_args!("{note}\n")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns and rows of a terminal, of which the prompt takes one.
+    const TERMINAL: [usize; 2] = [80, 24];
+
+    #[test]
+    fn the_overview_fits_a_terminal_and_names_every_scenario_without_a_fault() {
+        let listed = entries().unwrap();
+        let overview = Overview::of(&listed);
+        let [columns, rows] = TERMINAL;
+        // A note that is wrapped has an indentation of two columns.
+        let of_notes: usize = overview.notes.iter().map(|note| note.chars().count().div_ceil(columns - 2)).sum();
+        assert!(overview.rows.len() + of_notes < rows, "{} and {of_notes} rows", overview.rows.len());
+        assert!(overview.rows.iter().all(|(name, _)| name.len() + LEAST_QUESTION <= columns), "room for the questions");
+        let mut named: Vec<String> = Vec::new();
+        for (name, scenario) in &overview.rows {
+            let added = name.split_once(" [").map(|(_, added)| added.trim_end_matches(']'));
+            named.push(scenario.name.to_owned());
+            named.extend(added.map(|added| format!("{}{added}", scenario.name)));
+        }
+        let (_, others) = overview.notes[0].split_once(": ").unwrap();
+        named.extend(others.split(", ").map(str::to_owned));
+        let mut all: Vec<String> =
+            listed.iter().filter(|entry| !is_fault(entry)).map(|entry| entry.name.to_owned()).collect();
+        named.sort();
+        all.sort();
+        assert_eq!(named, all);
+        // A scenario that begins like another one is no twin of it.
+        assert!(overview.rows.iter().any(|(name, _)| name == "low-thw-overtake-at-cut-out"));
+    }
 }

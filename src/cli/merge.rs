@@ -12,6 +12,7 @@ use closecall_report::campaign::{
     CampaignReport, CountsText, CoverageText, FlakyText, Tally, VerdictText, ensemble_text,
 };
 use closecall_report::json;
+use closecall_studies::fidelity::Fidelity;
 use serde_json::json;
 
 use super::CliError;
@@ -121,6 +122,8 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
         ));
     }
     let saved = SavedCampaign::of(merged.folder.clone())?;
+    // Rates that an earlier merge has left are none of these parts.
+    Fidelity::remove(saved.folder())?;
     let rates = fast_parts.map(|fast| fast.merge(saved.folder(), args.resume, is_trusted)).transpose()?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let mut judged = tally.judgement();

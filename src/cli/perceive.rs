@@ -79,7 +79,7 @@ pub(super) struct PerceiveArgs {
     /// Leave out points whose position is not finite, or the origin: beams without a return
     #[arg(long, help_heading = heading::DATA)]
     drop_invalid: bool,
-    /// Sample of the scenario whose parameters hold, in place of the nominal values: that of the run
+    /// Sample of the scenario whose parameters hold, in place of the nominal values: the sample of the run
     /// that has recorded the scans
     #[arg(long, value_name = "N", help_heading = heading::SAMPLES)]
     sample: Option<u64>,
@@ -187,7 +187,7 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Reads the labels: those of the file if it is given, else those that go with the recording, if
+/// Reads the labels: from the file if it is given, else the labels beside the recording, if
 /// there are any.
 fn labels(recording: &Recording, file: Option<&Path>) -> Result<Option<Labels>, CliError> {
     let beside = recording.companion("labels");

@@ -10,6 +10,7 @@ use clap::Args;
 use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::arguments::positive;
 use closecall_campaign::execution::CampaignError;
+use closecall_campaign::gate::LEAST_SAMPLES;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
@@ -306,8 +307,8 @@ impl Rare<'_> {
         if let Some(search) = report.search {
             return match search.has_event {
                 true => ExitCode::Fail,
-                // An event that cannot happen is not found either.
-                false if !report.not_judged.is_empty() => ExitCode::Inconclusive,
+                // An event that cannot happen, or that hardly any run looked for, is not found either.
+                false if !report.not_judged.is_empty() || report.runs < LEAST_SAMPLES => ExitCode::Inconclusive,
                 false => ExitCode::Pass,
             };
         }
@@ -331,8 +332,7 @@ impl Rare<'_> {
             let bound = report.upper_bound_without_event.filter(|_| gate.confidence() <= 0.95)?;
             return (bound <= gate.max()).then_some(true);
         };
-        let (low, high) =
-            (estimate.mean.lower_bound(gate.confidence())?, estimate.mean.upper_bound(gate.confidence())?);
+        let (low, high) = (estimate.mean.lower_bound(gate.confidence())?, report.upper_bound(gate.confidence())?);
         if high <= gate.max() { Some(true) } else { (low >= gate.max()).then_some(false) }
     }
 
@@ -390,6 +390,11 @@ impl Rare<'_> {
             if let Some(gate) = self.gate {
                 let verdict = self.word(report);
                 let (max, confidence) = (gate.max(), percent(gate.confidence()));
+                if let Some(bound) = report.upper_bound(gate.confidence()).filter(|_| report.is_doubtful()) {
+                    outln!(
+                        "  judged by an upper bound that holds for any weights, because the estimate is doubtful: {bound:.3e}"
+                    );
+                }
                 outln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
             }
             // No command line repeats a run of a controller from outside, of standard input, or of
@@ -464,6 +469,11 @@ fn check_event(event: EventExpression, work: &Work, has_gate: bool) -> Result<()
     if event.second.is_some() && has_gate {
         return Err(CliError::usage(format!(
             "--max-probability bounds the probability of one event, and `{event}` is a difference of two"
+        )));
+    }
+    if has_gate && event.first.quantity.is_of_baseline() {
+        return Err(CliError::usage(format!(
+            "--max-probability judges the controller under test, and `{event}` is an event of the baseline alone"
         )));
     }
     for quantity in event.events().map(|event| event.quantity) {

@@ -37,7 +37,7 @@ pub(super) struct SampleArgs {
     /// can be re-enacted]
     #[arg(long, value_name = "TRACK", help_heading = heading::DATA)]
     lane_change: Option<u64>,
-    /// Number of the lane change among those of the track, in order of time, from 1 on [default: the most critical one]
+    /// Number of the lane change among the track's lane changes, in order of time, from 1 on [default: the most critical one]
     #[arg(long, value_name = "NUMBER", requires = "lane_change", help_heading = heading::DATA)]
     number: Option<usize>,
     /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario

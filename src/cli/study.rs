@@ -42,7 +42,7 @@ pub(super) struct StudyArgs {
     seed: u64,
     #[command(flatten)]
     controller: ControllerArgs,
-    /// Depth of the sensor simulation [default: that of the scenario]
+    /// Depth of the sensor simulation [default: the scenario's]
     #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     /// Number of worker threads [default: one per processor]
@@ -71,7 +71,7 @@ pub(super) struct SensitivityArgs {
     /// Vary a value of the scenario uniformly, named as for --set; can be given more than once
     #[arg(long = "factor", value_name = "KEY=LOW..HIGH", help_heading = heading::METHOD)]
     factors: Vec<FactorRange>,
-    /// Vary only the sampled parameters and those of --factor, not the list for driver, sensor and controller
+    /// Vary only the sampled parameters and the factors of --factor, not the list for driver, sensor and controller
     #[arg(long, help_heading = heading::METHOD)]
     no_default_factors: bool,
     /// `morris`: only a screening; `sobol`: only a decomposition, by all factors; `both`: by the factors that matter

@@ -65,7 +65,7 @@ pub(super) struct WatchArgs {
     #[arg(long, value_name = "FILE.parquet", help_heading = heading::OUTPUT)]
     pub(super) clusters: Option<PathBuf>,
     /// Write the same run as messages of ASAM OSI 3.8, `GroundTruth` and `SensorData` of each control step: one MCAP file with the map, or a
-    /// trace file for each type, whose name begins with date and type and ends with that of FILE
+    /// trace file for each type, whose name begins with date and type and ends with the name of FILE
     #[arg(long, value_name = "FILE.mcap|FILE.osi", value_parser = osi_file, help_heading = heading::OUTPUT)]
     pub(super) osi: Option<PathBuf>,
     /// Write the lanes in each `GroundTruth`, instead of the first one alone

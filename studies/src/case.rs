@@ -52,6 +52,18 @@ pub enum CausesError {
         /// The controller.
         controller: String,
     },
+    /// No failing sample fails when it is run again, and some have no outcome.
+    #[error(
+        "no sample of `{scenario}` that fails with `{controller}` fails if it is run again; a run ended in an error: {message}"
+    )]
+    NoOutcome {
+        /// The scenario.
+        scenario: String,
+        /// The controller.
+        controller: String,
+        /// The message of a run without an outcome.
+        message: String,
+    },
     /// The reduced case of a sample does not fail when it is run again.
     #[error(
         "the reduced case of sample {sample} with `{controller}` collided while it was looked for, but not if it is run \
@@ -121,7 +133,9 @@ impl CausesError {
             Self::Scenario(error) if error.is_io() => FailureKind::Io,
             Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
             Self::Scenario(_) => FailureKind::InvalidInput,
-            Self::Sample { .. } | Self::NotRepeated { .. } | Self::NotReduced { .. } => FailureKind::Sample,
+            Self::Sample { .. } | Self::NotRepeated { .. } | Self::NoOutcome { .. } | Self::NotReduced { .. } => {
+                FailureKind::Sample
+            }
             Self::Passes { .. }
             | Self::NoFailure { .. }
             | Self::Foreign { .. }

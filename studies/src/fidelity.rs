@@ -14,7 +14,7 @@
 //! ```
 //!
 //! has the least variance of all β. Covariance and variances are estimated from the samples; nothing is assumed of how well the modes
-//! agree. If they do not agree at all, β is about 0 and the estimate is that of the full chain. (Control variates: Lemieux, *Monte
+//! agree. If they do not agree at all, β is about 0 and the estimate is the estimate of the full chain. (Control variates: Lemieux, *Monte
 //! Carlo and Quasi-Monte Carlo Sampling*, 2009, section 4.1; with a mean that is estimated itself: Schmeiser, Taaffe and Wang,
 //! *Biased control-variate estimation*, 2001.)
 //!
@@ -128,6 +128,19 @@ impl Fidelity {
         let fidelity: Self = serde_json::from_str(&text).ok()?;
         let samples = folder.manifest().ok()?.sampling.samples;
         (fidelity.samples == samples).then_some(fidelity)
+    }
+
+    /// Removes the rates from the folder of a campaign whose samples are others by now. A folder
+    /// without rates stays as it is.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be removed.
+    pub fn remove(folder: &Folder) -> Result<(), WriteError> {
+        let path = folder.file(FIDELITY_FILE);
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(WriteError::new(&path, source)),
+            _ => Ok(()),
+        }
     }
 
     /// Writes the rates into the folder of the campaign.

@@ -41,9 +41,9 @@ fn assumed(text: &str) -> Vec<String> {
 }
 
 const PAGE: &str = include_str!("../../docs/reference/assumptions.md");
-/// The heading of the list of the rear radars, which follows that of the controllers.
+/// The heading of the list of the rear radars, which follows the list of the controllers.
 const OF_RADARS: &str = "## Rear radars";
-/// The heading of the list of the import, which follows that of the rear radars.
+/// The heading of the list of the import, which follows the list of the rear radars.
 const OF_IMPORT: &str = "## Import of OpenSCENARIO";
 
 /// Returns the first cells of a table of assumptions.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::native_controllers::{compile, lib};
 use crate::support::{ROOT, closecall, code, folder, json, library, message, records, stderr, stdout};
 
 /// The seed of all campaigns here.
@@ -179,6 +180,45 @@ fn the_nearest_failure_is_at_the_known_distance_of_the_boundary() {
         "{text}"
     );
     assert_eq!(stdout(&closecall(words), 0), text);
+}
+
+/// A controller that has an error if the vehicle behind starts in a range of distances.
+const LOSES_THE_REAR: &str = r#"
+#include <stdlib.h>
+#include "closecall_controller.h"
+uint32_t closecall_controller_abi(void) { return CLOSECALL_CONTROLLER_ABI; }
+void *closecall_controller_create(const closecall_setup *setup) { (void)setup; return calloc(1, sizeof(int)); }
+void closecall_controller_destroy(void *controller) { free(controller); }
+const char *closecall_controller_error(void *controller) { (void)controller; return "lost the vehicle behind"; }
+int32_t closecall_controller_step(void *controller, const closecall_input *in, closecall_command *command) {
+    int is_first = (*(int *)controller)++ == 0;
+    for (uint64_t i = 0; i < in->track_count; i++)
+        if (is_first && in->tracks[i].x_m > -19.5 && in->tracks[i].x_m < -17.5) return 7;
+    command->acceleration_mps2 = 0.0;
+    command->state = 0;
+    return 0;
+}
+"#;
+
+#[test]
+fn runs_without_an_outcome_in_a_search_are_counted_with_a_message() {
+    let parent = folder();
+    let (scenario, out) = (gap_scenario(parent.path()), parent.path().join("out"));
+    let source = parent.path().join("loses.c");
+    std::fs::write(&source, LOSES_THE_REAR).unwrap();
+    // The range lies between the gaps that fail and the nominal one.
+    let controller = lib(&compile(source.to_str().unwrap(), &parent.path().join("loses.so"), &[]));
+    let (scenario, dir) = (scenario.to_str().unwrap(), out.to_str().unwrap());
+    let words =
+        ["campaign", scenario, "-n", "60", "--seed", SEED, "--no-gate", "--out", dir, "--controller", &controller];
+    let output = closecall(words.into_iter().chain(["--controller-timeout-ms", "60000", "--record", "failures:0"]));
+    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    let file = parent.path().join("nearest.toml");
+    // Each run starts a process.
+    let text = stdout(&closecall(["minimize", dir, "--nearest", "-n", "20", "--out", file.to_str().unwrap()]), 0);
+    let line =
+        text.lines().find(|line| line.contains("of the search ended in an ERROR and count as not failing, such as: "));
+    assert!(line.is_some_and(|line| line.ends_with("lost the vehicle behind")), "{text}");
 }
 
 #[test]

@@ -141,7 +141,7 @@ fn two_carriageways_become_a_report_that_links_each_verdict_with_its_recorded_se
             assert!(out.join(&file).is_file(), "{file}");
             assert!(file.ends_with("svg") || page.contains(&file), "{file} is linked");
         }
-        // The colours of the picture are those of every other picture.
+        // The picture has the colours of every other picture.
         let picture = fs::read_to_string(out.join(format!("encounters/{name}.svg"))).unwrap();
         let label = |track: u64| picture.lines().find(|line| line.contains(&format!(">track-{track} ")));
         pink += u64::from(label(rear).is_some_and(|label| label.contains("#c2246c")));

@@ -67,7 +67,8 @@ fn the_library_is_listed_and_works_from_anywhere() {
     let text = stdout(&run_in(folder.path(), &["list"]), 0);
     let line = text.lines().find(|line| line.starts_with("paper-figure ")).expect("a line for each scenario");
     assert!(line.contains("  Does the MIS "), "{text}");
-    assert!(text.lines().count() < 40 && text.contains("closecall list faults"), "{text}");
+    assert!(text.lines().count() < 24 && text.contains("closecall list faults"), "{text}");
+    assert!(text.contains("ramp-merges [-without-merge]"), "{text}");
     let faults = stdout(&run_in(folder.path(), &["list", "faults"]), 0);
     assert!(faults.contains("lidar-dead\n  What does the system do"), "{faults}");
     let listing = stdout(&run_in(folder.path(), &["list", "paper"]), 0);

@@ -118,7 +118,7 @@ fn the_design_coverage_fills_holes_and_its_weights_give_back_the_probability() {
     let whole = json(&closecall(words.into_iter().chain(out_of_merge)), 0);
     let table = |folder: &Path| fs::read(folder.join("outcomes.parquet")).unwrap();
     assert!(table(&out) == table(&merged));
-    // Weights and rates are those of the whole campaign, to the bit.
+    // Weights and rates equal the whole campaign's, to the bit.
     assert_eq!(item(&whole, "gap"), gap);
 }
 

@@ -25,7 +25,7 @@ fn committed() -> Digests {
 fn outcomes_of_the_library_have_the_stated_bits() {
     let stated = committed();
     assert!(stated.outcomes.len() >= LEAST_SCENARIOS, "{}", stated.outcomes.len());
-    assert_eq!(generator::functions(), stated.functions, "the mathematical functions are not those of {DIGESTS}");
+    assert_eq!(generator::functions(), stated.functions, "the mathematical functions differ from {DIGESTS}");
     let now = generator::digests().unwrap();
     let changed: Vec<_> =
         now.outcomes.iter().filter(|(name, digest)| stated.outcomes.get(*name) != Some(digest)).collect();

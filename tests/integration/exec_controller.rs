@@ -18,7 +18,7 @@ use crate::support::{closecall, code, folder, library, message, program, records
 const TIMEOUT_MS: &str = "2000";
 
 /// The faults of `bad.sh`: its arguments, and a part of the error message.
-const FAULTS: [(&str, &str); 17] = [
+const FAULTS: [(&str, &str); 18] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
@@ -35,6 +35,11 @@ const FAULTS: [(&str, &str); 17] = [
     ("chatter", "the process answered \"this is not an answer\", which is not JSON"),
     ("other-step", "for the control step at 80000000 ns, and was asked for the one at 40000000 ns"),
     ("farewell", "wrote a line that nobody had asked for"),
+    (
+        "aborts-last",
+        "the process crashed (signal: 6 (SIGABRT)) after its last answer, when its input was closed; it last wrote: \
+         terminate called after throwing an instance of 'std::runtime_error' | what(): lost the",
+    ),
     ("version", "speaks version 2 of the protocol, this is version 1"),
 ];
 
@@ -86,7 +91,18 @@ fn each_fault_has_an_error_message_of_its_own_and_leaves_no_process_behind() {
         let output = run_with(&format!("exec:sh tests/fixtures/controllers/bad.sh {fault}"), &mark);
         assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
         assert!(message(&output).contains(expected), "{fault}: {}", stderr(&output));
+        assert!(!stderr(&output).contains('\u{1b}'), "{fault}: what a process writes controls no terminal");
         assert_eq!(left_behind(&mark), Vec::<String>::new(), "{fault}");
+    }
+}
+
+#[test]
+fn a_process_that_leaves_late_or_with_any_status_after_its_last_answer_has_its_outcome() {
+    for end in ["outlives", "exits-last"] {
+        let mark = format!("{}-{end}", std::process::id());
+        let output = run_with(&format!("exec:sh tests/fixtures/controllers/bad.sh {end}"), &mark);
+        assert!(stdout(&output, 0).contains("ended at"), "{end}");
+        assert_eq!(left_behind(&mark), Vec::<String>::new());
     }
 }
 

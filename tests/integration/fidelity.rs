@@ -43,7 +43,7 @@ fn fast_runs_narrow_the_interval_of_a_rate_and_other_campaigns_are_refused() {
     // The cruise control does not look back: the modes hardly differ in its arm.
     assert!(of_baseline["correlation"].as_f64().unwrap() > 0.9, "{of_baseline}");
     assert!(sharp < 0.6 * width(&of_baseline["plain_interval_95"]), "{of_baseline}");
-    // The exact interval of all fast samples, of which 900 are known, is about as wide: the fast runs give no more than they have.
+    // The exact interval of all 900 known fast samples is about as wide: the fast runs give no more than they have.
     assert!(of_baseline["estimate"]["worth_samples"].as_f64().unwrap() < 900.0, "{of_baseline}");
     let induced = &report["rates"][3];
     assert_eq!(induced["of"], "induced");
@@ -162,6 +162,10 @@ fn a_campaign_that_is_killed_among_its_fast_samples_resumes_to_the_same_bytes() 
     let summary = |out: &Path| String::from_utf8(bytes(out, "summary.md")).unwrap();
     campaign(&killed, &format!("-n 60 {alone} --resume"));
     assert!(summary(&killed).contains("Rates with fast sensors"), "the rates of the same samples stay");
+    tear(&killed.join("journal.jsonl"), 30);
+    campaign(&killed, &format!("-n 60 {alone} --resume"));
+    assert!(!summary(&killed).contains("Rates with fast sensors"), "samples have run again since the rates");
+    assert!(!killed.join("fidelity.json").exists());
     campaign(&killed, &format!("-n 70 {alone} --resume"));
     assert!(!summary(&killed).contains("Rates with fast sensors"), "rates of 60 samples are none of 70");
     campaign(&killed, &format!("-n 70 {SLOW} --resume"));
@@ -226,6 +230,18 @@ fn a_signal_ends_a_campaign_among_its_fast_samples_without_a_verdict() {
     let resume = text.lines().find_map(|line| line.strip_prefix("resume: ")).unwrap();
     assert!(resume.contains("--fidelity ground-truth:1000000") && resume.ends_with("--resume"), "{resume}");
     assert!(!out.join("fidelity.json").exists() && !out.join("report.html").exists());
+}
+
+#[test]
+fn fast_samples_without_an_outcome_say_why() {
+    let place = folder();
+    let words = "campaign low-thw-overtake -n 4 --no-gate --sensors object --fidelity ground-truth:3";
+    let mut command = program();
+    command.args(words.split_whitespace()).args(["--controller", "exec:false", "--out"]).arg(place.path().join("out"));
+    let output = command.output().unwrap();
+    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    let said = message(&output);
+    assert!(said.contains("fidelity: low-thw-overtake: 12 ") && said.contains("before its greeting"), "{said}");
 }
 
 #[test]

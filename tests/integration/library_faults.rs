@@ -49,7 +49,7 @@ fn a_failed_sensor_leaves_the_system_not_available_with_its_reason_and_no_gate_p
     for (name, reason) in FAILED {
         let outcome = json(&closecall(["run", name, "--format", "json"]), 0).to_string();
         assert!(outcome.contains(reason), "{name}: {outcome}");
-        // A gate that everything meets, and no other criterion.
+        // A gate that nothing misses, and no other criterion.
         let campaign = |path: &Path| {
             let path = path.to_str().unwrap();
             let args = ["campaign", path, "-n", "4", "--seed", "1", "--paired", "--no-validity-checks"];
@@ -63,7 +63,7 @@ fn a_failed_sensor_leaves_the_system_not_available_with_its_reason_and_no_gate_p
     for name in ["camera-dead", "front-radar-dead", "surround-dead", "object-frozen"] {
         let path = unjudged(folder.path(), name, true);
         let args = ["campaign", path.to_str().unwrap(), "-n", "24", "--seed", "1", "--paired", "--no-validity-checks"];
-        let text = stdout(&closecall(args.iter().chain(&["--max-collisions", "1000"])), 0);
+        let text = stdout(&closecall(args.iter().chain(&["--max-collisions", "20"])), 0);
         assert!(text.contains("PASS"), "{name}: {text}");
     }
 }

@@ -125,7 +125,7 @@ fn libraries_in_c_and_rust_have_the_outcomes_of_the_built_in_controller() {
 }
 
 /// The faults of `faulty.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 13] = [
+const FAULTS: [(&str, &str); 14] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV)); it last wrote: about to crash"),
     ("child", "the controller ended its process (signal: 11 (SIGSEGV))"),
     (
@@ -133,6 +133,7 @@ const FAULTS: [(&str, &str); 13] = [
         "SIGABRT)); it last wrote: the library threw a C++ exception out of closecall_controller_step: catch it",
     ),
     ("abort", "the controller ended its process (signal: 6 (SIGABRT))"),
+    ("frees", "the controller ended its process (signal: 6 (SIGABRT)); it last wrote: freed twice"),
     ("exit-0", "the controller ended its process (exit status: 0)"),
     ("exit-3", "the controller ended its process (exit status: 3)"),
     ("hang", "failed at 2.00 s: no answer within 500 ms"),
@@ -346,6 +347,28 @@ fn a_crash_in_a_single_run_is_an_error_and_what_a_library_prints_is_no_answer() 
     assert_eq!(stdout(&output, 0), stdout(&run("none"), 0));
     // What a library prints is quoted only if its process ends: see docs/reference/controllers.md.
     assert!(!stderr(&output).contains("acceleration_mps2"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_library_is_unloaded_is_none() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let run = |fault| {
+        let mut command = program();
+        command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", &library]);
+        with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
+    };
+    for (fault, expected) in [
+        ("frees", "the controller ended its process (signal: 6 (SIGABRT)); it last wrote: freed twice"),
+        ("frees-never", "the process hangs: no answer in twice the 1000 ms allowed"),
+    ] {
+        let output = run(fault);
+        assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{fault}: {}", stderr(&output));
+    }
+    // A worker process of a campaign unloads the library after all its samples.
+    assert_eq!(stdout(&run("unloads"), 0), stdout(&run("none"), 0));
+    stdout(&campaign(&library, &folder.path().join("out"), "2", Some("unloads"), &[]), 0);
 }
 
 #[test]

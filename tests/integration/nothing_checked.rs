@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::support::{closecall, code, folder, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
 
 /// Options that gate, and options that do not, each with a value that everything meets.
 const OPTIONS: [&[&str]; 20] = [
@@ -148,4 +148,112 @@ fn a_system_that_was_not_there_to_be_tested_is_not_judged() {
     let refused = judged(&text, "gap-1.6", 4);
     assert!(refused.contains("NOT JUDGED") && refused.contains("never slowed the ego"), "{refused}");
     assert!(judged(&text, "mis", 0).contains("PASS"));
+}
+
+#[test]
+fn a_gate_that_no_sample_can_miss_says_nothing() {
+    let path = library("overtake-without-brake");
+    let run = |gate: &str, expected: i32| {
+        let args = ["campaign", path.to_str().unwrap(), "-n", "24", "--sensors", "ground-truth", "--gate", gate];
+        stdout(&closecall(args), expected)
+    };
+    for gate in [
+        "count(ego_collided) >= 0",
+        "share(ego_collided) <= 1",
+        "upper(touched) <= 1",
+        "lower(ego_collided) >= 0",
+        "max(max_jerk_mps3) <= 1e300",
+        "sum(harm) >= 0",
+        "count(harm < -1) <= 0",
+    ] {
+        let text = run(gate, 4);
+        assert!(text.contains("it holds whatever happens in these samples"), "{gate}: {text}");
+        assert!(!text.contains("PASS"), "{gate}: {text}");
+    }
+}
+
+/// Writes a scenario of the library without checks and requirements, under another name.
+fn without_checks(folder: &Path, more: &str) -> PathBuf {
+    let text = std::fs::read_to_string(library("overtake-without-brake")).unwrap();
+    let (before, rest) = text.split_once("[checks]").unwrap();
+    let (_, after) = rest.split_once("\n\n").unwrap();
+    let (head, tail) = before.split_once("requirements = [").unwrap();
+    let (_, tail) = tail.split_once("\n").unwrap();
+    let head = head.replace("name = \"overtake-without-brake\"", "name = \"unchecked\"");
+    let path = folder.join("unchecked.toml");
+    std::fs::write(&path, format!("{head}{tail}{more}{after}")).unwrap();
+    path
+}
+
+#[test]
+fn a_scenario_that_nothing_judges_does_not_pass_beside_one_that_passes() {
+    let folder = folder();
+    let unchecked = without_checks(folder.path(), "");
+    let checked = library("overtake-without-brake");
+    let [unchecked, checked] = [&unchecked, &checked].map(|path| path.to_str().unwrap());
+    let fixed = ["-n", "60", "--sensors", "ground-truth", "--paired"];
+    let run =
+        |words: &[&str], expected: i32| stdout(&closecall(["campaign"].iter().chain(words).chain(&fixed)), expected);
+    assert!(run(&[checked], 0).contains("PASS"));
+    let text = run(&[checked, unchecked], 4);
+    assert!(text.contains("NOT JUDGED") && text.contains("unchecked: no gate and no check"), "{text}");
+    // What the baseline does says nothing of the system under test.
+    for gate in ["count(baseline.ego_collided) <= 0", "share(baseline.max_jerk_mps3 > 90) <= 0.5"] {
+        let text = run(&[unchecked, "--gate", gate], 4);
+        assert!(text.contains("NOT JUDGED") && text.contains("the system under test there"), "{text}");
+    }
+    let both = ["--gate", "count(ego_collided) <= 0"];
+    assert!(run(&[&[checked, unchecked][..], &both].concat(), 0).contains("PASS"));
+}
+
+#[test]
+fn a_gate_that_demands_less_than_the_gate_of_a_file_is_overridden() {
+    let folder = folder();
+    let gate = "[gate]\nrequire = [\"count(ego_collided) <= 0\"]\n\n";
+    let path = without_checks(folder.path(), gate);
+    let run = |more: &[&str], within: &Path| {
+        let mut command = program();
+        let fixed = ["campaign", path.to_str().unwrap(), "-n", "24", "--sensors", "ground-truth", "--no-out"];
+        command.args(fixed).args(more).current_dir(within);
+        command.output().unwrap()
+    };
+    let elsewhere = folder.path().join("elsewhere");
+    std::fs::create_dir(&elsewhere).unwrap();
+    assert!(stdout(&run(&[], &elsewhere), 0).contains("PASS"));
+    let text = stdout(&run(&["--max-collisions", "9"], &elsewhere), 4);
+    assert!(text.contains("OVERRIDDEN") && text.contains("gate count(ego_collided) <= 0, replaced by"), "{text}");
+    // The project file stands above the scenario file, and the command line above both.
+    let project = |bound: u64| {
+        std::fs::write(
+            elsewhere.join("closecall.toml"),
+            format!("[gate]\nrequire = ['count(ego_collided) <= {bound}']\n"),
+        )
+        .unwrap();
+    };
+    project(9);
+    assert!(stdout(&run(&[], &elsewhere), 4).contains("OVERRIDDEN"));
+    project(0);
+    assert!(stdout(&run(&[], &elsewhere), 0).contains("PASS"));
+    std::fs::write(elsewhere.join("closecall.toml"), "[gate]\nrequire = ['max(max_jerk_mps3) <= 1']\n").unwrap();
+    let text = stdout(&run(&["--max-jerk", "500"], &elsewhere), 4);
+    assert!(text.contains("gate max(max_jerk_mps3) <= 1, replaced by max(max_jerk_mps3) <= 500"), "{text}");
+}
+
+#[test]
+fn a_rare_event_that_no_run_or_every_run_has_and_one_of_the_baseline_are_no_gate() {
+    let path = library("overtake-without-brake");
+    let fixed = ["campaign", path.to_str().unwrap(), "--sensors", "ground-truth", "--design", "importance", "--paired"];
+    for (event, part) in [
+        ("harm < 0", "no value of `harm` lies on the other side of 0"),
+        ("min_ttc_rear_s < -1e9", "on the other side of -1e9"),
+        ("baseline.ego_collided", "an event of the baseline alone"),
+    ] {
+        let more = ["--event", event, "--guide", "min_gap_rear_m", "--max-probability", "0.5", "-n", "100"];
+        let output = closecall(fixed.iter().chain(&more));
+        assert_eq!(code(&output), 2, "{event}: {}", stderr(&output));
+        assert!(message(&output).contains(part), "{event}: {}", stderr(&output));
+    }
+    // A search that hardly ran has not looked.
+    let words = ["campaign", path.to_str().unwrap(), "--sensors", "ground-truth", "--design", "search", "-n", "1"];
+    stdout(&closecall(words.iter().chain(&["--event", "collision"])), 4);
 }

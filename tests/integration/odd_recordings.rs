@@ -269,7 +269,7 @@ fn one_lane_number_for_all_vehicles_is_no_success_of_any_command() {
     }
 }
 
-/// Writes three vehicles at 30 m/s, of which the first one moves to the left by 3.75 m within
+/// Writes three vehicles at 30 m/s. The first one moves to the left by 3.75 m within
 /// `duration_s`, if that is given.
 fn three_vehicles(to: &Path, duration_s: Option<f64>) -> PathBuf {
     let mut text =

@@ -167,7 +167,7 @@ fn labels_do_not_overwrite_their_input_and_nothing_is_half_written() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// A file of another program: cars on a road along +x, y up, one of which changes lanes.
+/// A file of another program: cars on a road along +x, y up. One of them changes lanes.
 fn of_others(system: &str, kind: &str, properties: impl Fn(i32) -> Value) -> Value {
     const LANE_M: f64 = 3.6;
     let mut frames = serde_json::Map::new();

@@ -32,7 +32,15 @@ pub(crate) fn run_with(scenario: &str, perception: &str, more: &[&str]) -> Outpu
     closecall([&args, more].concat())
 }
 
-/// Runs eight seconds of the headline with a fault of the perception, and returns the message of the failed sample.
+/// Returns the arguments of a campaign that judges nothing, with two settings.
+fn campaign<'a>(samples: &'a str, duration: &'a str, setting: &'a str, out: &'a Path) -> Vec<&'a str> {
+    let judges_nothing = ["campaign", "low-thw-overtake", "--no-gate", "--no-validity-checks", "--set", "expects=[]"];
+    let out = out.to_str().unwrap();
+    let settings = ["--sensors", "full", "-n", samples, "--set", duration, "--set", setting, "--out", out];
+    [&judges_nothing[..], &settings].concat()
+}
+
+/// Runs two seconds of the headline with a fault of the perception, and returns the message of the failed sample.
 fn failure(kind: &str, fault: &str, more: &[&str]) -> String {
     let command = format!("{GROUPS} {kind} {fault}");
     let short = ["--set", "duration-s=2", "--set", "sensors.rear-camera.pipeline=off"];
@@ -156,6 +164,11 @@ fn each_wrong_answer_ends_the_sample_and_names_the_field() {
         ("tracks", "other-list", "`tracks` must be a list of at most 256, it is absent"),
         ("tracks", "crash", "the process ended (exit status: 3) after 29 answers; it last wrote: the roof is on fire"),
         ("tracks", "last-words", "a line that nobody had asked for"),
+        (
+            "tracks",
+            "leaves",
+            "the process crashed (signal: 6 (SIGABRT)) after its last answer, when its input was closed",
+        ),
         ("tracks", "hello", "the sensors failed to perceive: `"),
         ("tracks", "hello", "`answers` must be \"detections\" or \"tracks\", it is \"boxes\""),
         ("detections", "nan", "`x_m` must be a finite number, it is NaN"),
@@ -203,26 +216,8 @@ fn a_campaign_knows_its_perception_and_a_foreign_folder_does_not_run_it() {
     std::fs::copy("tests/fixtures/perceptions/groups.py", &script).unwrap();
     let out = folder.path().join("out");
     let perception = setting(&format!("python3 {} tracks", script.display()));
-    let args: Vec<&str> = vec![
-        "campaign",
-        "low-thw-overtake",
-        "-n",
-        "2",
-        "--seed",
-        "1",
-        "--sensors",
-        "full",
-        "--no-gate",
-        "--no-validity-checks",
-        "--set",
-        "expects=[]",
-        "--set",
-        "duration-s=4",
-        "--set",
-        &perception,
-        "--out",
-        out.to_str().unwrap(),
-    ];
+    let mut args = campaign("2", "duration-s=4", &perception, &out);
+    args.extend(["--seed", "1"]);
     stdout(&closecall(args.clone()), 0);
     let manifest = json_file(&out.join("manifest.json"));
     let stated = &manifest["controllers"][0];
@@ -279,25 +274,8 @@ fn a_network_of_one_s_own_classifies_the_crops() {
         assert!(message(&output).contains(stated), "{}", message(&output));
     }
     let folder = folder();
-    let args = [
-        "campaign",
-        "low-thw-overtake",
-        "-n",
-        "1",
-        "--sensors",
-        "full",
-        "--no-gate",
-        "--no-validity-checks",
-        "--set",
-        "expects=[]",
-        "--set",
-        "duration-s=1",
-        "--set",
-        "sensors.rear-camera.model=sensors/models/rear-classifier.onnx",
-        "--out",
-        folder.path().to_str().unwrap(),
-    ];
-    stdout(&closecall(args), 0);
+    let own = "sensors.rear-camera.model=sensors/models/rear-classifier.onnx";
+    stdout(&closecall(campaign("1", "duration-s=1", own, folder.path())), 0);
     let manifest = json_file(&folder.path().join("manifest.json"));
     let models = manifest["models"].as_array().unwrap();
     let [shipped, own] = &models[..] else { panic!("{models:?}") };

@@ -123,6 +123,17 @@ fn each_fault_of_a_library_costs_its_sample_and_leaves_no_process() {
 }
 
 #[test]
+fn a_crash_while_a_perception_is_freed_is_an_error_of_its_run_and_one_while_its_library_is_unloaded_is_none() {
+    let folder = folder();
+    let [tracks, _] = faulty(folder.path());
+    let output = run(&tracks, Some("frees"), &[]);
+    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    let expected = "the perception ended its process (signal: 6 (SIGABRT)); it last wrote: freed twice";
+    assert!(message(&output).contains(expected), "{}", stderr(&output));
+    assert_eq!(stdout(&run(&tracks, Some("unloads"), &[]), 0), stdout(&run(&tracks, None, &[]), 0));
+}
+
+#[test]
 fn a_library_that_cannot_perceive_is_refused_before_the_first_sample() {
     let folder = folder();
     let source = |name: &str, text: &str| {

@@ -205,7 +205,7 @@ fn parts_of_weighted_runs_merge_to_the_bytes_of_one_machine() {
     for file in ["rare.json", "rare-journal.jsonl"] {
         assert!(bytes(&merged, file) == bytes(&at("whole"), file), "{file}");
     }
-    // The merged runs are judged as those of one machine.
+    // The merged runs are judged as runs of one machine.
     let verdict = |max: &str| {
         code(&merge(&[first, second, third], &at(&format!("judged-{max}")), &format!("--max-probability {max}")))
     };

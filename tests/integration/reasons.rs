@@ -127,6 +127,10 @@ fn a_passing_lane_that_was_occupied_until_the_braking_is_the_stated_reason_and_n
     let text = stdout(&closecall(args), 0);
     assert!(text.contains("passing lane occupied"), "{text}");
     assert!(!text.contains("emergency braking required"), "{text}");
+    // The sentence and the line about the system name the same time.
+    let told = text.split("the MIS stayed off: ").nth(1).unwrap().split("; faults").next().unwrap();
+    assert_eq!(told, "passing lane occupied, 3.6 to 9.6 s", "{text}");
+    assert!(text.contains(&format!("  MIS: {told}\n")), "{text}");
 }
 
 #[test]

@@ -300,7 +300,7 @@ fn a_short_record_before_the_lane_change_is_refused_and_a_second_lane_change_is_
 /// Number of lane changes of two windows of US-101 that are sampled, of 27.
 const SAMPLED_OF_US101: usize = 19;
 
-/// The lane changes of the US-101 windows, of which each is sampled or refused for a reason that is named.
+/// The lane changes of the US-101 windows. Each is sampled or refused for a reason that is named.
 #[test]
 fn most_recorded_lane_changes_are_sampled_and_the_rest_is_refused_for_a_reason() {
     let Some(data) = data() else { return };

@@ -169,7 +169,7 @@ fn a_result_that_flips_at_half_the_time_step_counts_as_a_collision_and_flips_are
     let path = folder.path().join("edge.toml");
     std::fs::write(&path, EDGE).unwrap();
     let path = path.to_str().unwrap();
-    let scenario = ["campaign", path, "-n", "400", "--controller", "acc", "--max-collisions", "400"];
+    let scenario = ["campaign", path, "-n", "400", "--controller", "acc", "--max-collisions", "399"];
     let args = [&scenario[..], &["--check-share", "1"]].concat();
     let run =
         |more: &[&str], expected| json(&closecall(args.iter().chain(more).chain(&["--format", "json"])), expected);

@@ -1,7 +1,7 @@
 //! The lateral path of a vehicle: its lateral position as a function of the distance along the road.
 //!
 //! Between two points of the path, the lateral position is a quintic polynomial. Its first and second
-//! derivatives at the points are those of the parabola through the point and its two neighbours, so
+//! derivatives at the points are the derivatives of the parabola through the point and its two neighbours, so
 //! that the lateral acceleration of a vehicle on the path does not jump. The path ends parallel to
 //! the road.
 
@@ -65,7 +65,7 @@ impl LateralPath {
     }
 }
 
-/// Returns the lateral position at a point, and its derivatives there: those of the parabola through
+/// Returns the lateral position at a point, and the derivatives of the parabola through
 /// the point and its neighbours. The last point has none.
 fn state(points: &[[f64; 2]], index: usize) -> [f64; 3] {
     let [x, d] = points[index];

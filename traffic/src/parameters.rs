@@ -24,7 +24,7 @@ const READABLE_DIGITS: i32 = 4;
 
 impl Value {
     /// Returns the value for readers: a number has four significant digits. All digits, with which
-    /// the same run is made again, are those of `Display`.
+    /// the same run is made again, are what `Display` writes.
     pub fn readable(&self) -> String {
         match self {
             Self::Number(value) => readable(*value),

@@ -11,6 +11,7 @@
 mod fit_object_sensors;
 mod fuzz_readers;
 mod make_trajectory_file;
+mod plot;
 mod plot_echo_widths;
 mod plot_regimes;
 mod render_aerial;

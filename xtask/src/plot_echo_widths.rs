@@ -10,13 +10,12 @@
 //! gives lengths, without saying whether light passes them once or twice.
 
 use std::error::Error;
-use std::path::PathBuf;
 
 use closecall_sensors::lidar::{LidarConfig, echo_pulse_width_ns};
 use closecall_traffic::{Check, Num, Parameters};
 use plotters::prelude::*;
 
-use crate::plot_regimes::steps;
+use crate::plot::{self, Plane, steps};
 
 /// Ranges of the axes: range (m) and echo pulse width (ns).
 const RANGE_M: (f64, f64) = (0.0, 220.0);
@@ -37,15 +36,10 @@ const LINES: [(&str, f64, f64); 4] = [
 const MEASURED: [(f64, f64); 3] = [(19.865, 1.829), (14.995, 1.989), (9.984, 2.029)];
 
 pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
-    let path: PathBuf = words.into_iter().next().ok_or("give the path of the SVG to write")?.into();
-    let area = SVGBackend::new(&path, SIZE_PX).into_drawing_area();
-    area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&area)
-        .caption("Echo pulse width", ("sans-serif", 22))
-        .margin(12)
-        .x_label_area_size(46)
-        .y_label_area_size(56)
-        .build_cartesian_2d(RANGE_M.0..RANGE_M.1, WIDTH_NS.0..WIDTH_NS.1)?;
+    plot::write(words, SIZE_PX, "Echo pulse width", [RANGE_M, WIDTH_NS], draw)
+}
+
+fn draw(chart: &mut Plane<'_>) -> Result<(), Box<dyn Error>> {
     chart.configure_mesh().light_line_style(WHITE).x_desc("range [m]").y_desc("echo pulse width [ns]").draw()?;
     for (index, (name, reflectivity, window_transmission)) in LINES.into_iter().enumerate() {
         let config = LidarConfig { window_transmission: Num::Fixed(window_transmission), ..LidarConfig::default() };
@@ -67,12 +61,5 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
             .label(name)
             .legend(move |(x, y)| Circle::new((x + 8, y), 4, mark));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK)
-        .draw()?;
-    area.present()?;
     Ok(())
 }

@@ -11,14 +11,12 @@
 //! 36 m/s, with an actuator lag of 0.15 s, over two minutes.
 
 use std::error::Error;
-use std::path::PathBuf;
 
 use closecall_controllers::{Lead, Regime, Wiedemann99, Wiedemann99Config, Wiedemann99Model};
 use closecall_traffic::{Check, Parameters};
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-type Plane<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+use crate::plot::{self, Plane, steps};
 
 const LEAD_MPS: f64 = 30.0;
 const DESIRED_MPS: f64 = 36.0;
@@ -65,11 +63,6 @@ fn stretches(driver: &Wiedemann99, gap_m: f64) -> Vec<([(f64, f64); 2], Regime)>
     stretches
 }
 
-/// Returns the values from the start of a range up to its end, at a distance of `step`.
-pub(crate) fn steps((from, to): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
-    (0..).map(move |index| from + f64::from(index) * step).take_while(move |value| *value < to)
-}
-
 /// Returns the speed difference (m/s) and the gap (m) at each step of a driver that approaches from
 /// behind.
 fn approach(driver: &Wiedemann99) -> Vec<(f64, f64)> {
@@ -109,31 +102,13 @@ fn thresholds(driver: &Wiedemann99) -> Vec<(&'static str, Vec<(f64, f64)>)> {
 }
 
 pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
-    let path: PathBuf = words.into_iter().next().ok_or("give the path of the SVG to write")?.into();
     let driver = Wiedemann99Config::default().check(&Parameters::default())?;
-    let area = SVGBackend::new(&path, SIZE_PX).into_drawing_area();
-    area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&area)
-        .caption("Wiedemann 99 behind a leader at 30 m/s", ("sans-serif", 22))
-        .margin(12)
-        .x_label_area_size(46)
-        .y_label_area_size(56)
-        .build_cartesian_2d(OPENING_MPS.0..OPENING_MPS.1, GAP_M.0..GAP_M.1)?;
-    draw(&mut chart, &driver)?;
-    chart
-        .configure_mesh()
-        .disable_mesh()
-        .x_desc("Δv = speed of the leader − own speed [m/s]")
-        .y_desc("gap, bumper to bumper [m]")
-        .draw()?;
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK)
-        .draw()?;
-    area.present()?;
-    Ok(())
+    plot::write(words, SIZE_PX, "Wiedemann 99 behind a leader at 30 m/s", [OPENING_MPS, GAP_M], |chart| {
+        draw(chart, &driver)?;
+        let (x, y) = ("Δv = speed of the leader − own speed [m/s]", "gap, bumper to bumper [m]");
+        chart.configure_mesh().disable_mesh().x_desc(x).y_desc(y).draw()?;
+        Ok(())
+    })
 }
 
 fn draw(chart: &mut Plane<'_>, driver: &Wiedemann99) -> Result<(), Box<dyn Error>> {

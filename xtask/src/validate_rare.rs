@@ -27,7 +27,7 @@ use closecall_simulation::Arm;
 use closecall_simulation::controller::BuiltIn;
 use closecall_traffic::statistics::normal::TruncatedStandardNormal;
 
-/// The probabilities, and the least factor by which the runs have to be fewer than those of plain sampling.
+/// The probabilities, and the least factor by which they need fewer runs than plain sampling.
 const CASES: [(f64, f64); 3] = [(1e-3, 10.0), (1e-5, 50.0), (1e-6, 500.0)];
 /// The relative width that is asked for.
 const WIDTH: f64 = 0.5;
@@ -43,7 +43,7 @@ const OF_FIXTURE: f64 = 3.166_793e-5;
 enum Regions {
     One,
     Two,
-    /// Two, of which the first rises late: a search follows the score of the other one.
+    /// Two. The first rises late: a search follows the score of the other one.
     Hidden,
 }
 

@@ -116,7 +116,7 @@ Finds cars and trucks in oblique aerial pictures, as oriented boxes around the v
 - **Judged on** {len(pictures)} held-out pictures with {count[0]} cars and {count[1]} trucks: body shapes and seeds that training never saw.
 - **Has never seen**: a photograph; motorcycles, buses apart from coaches, trailers behind cars; night, rain, snow, fog; bridges,
   trees above the road, crossings, parked cars; haze, motion blur, compression. What it says of photographs is not known.
-- **Boxes are those of the visible body**, not of its footprint: roofs lean away from the nadir. `docs/explanation/aerial.md` has the bias.
+- **Boxes enclose the visible body**, not its footprint: roofs lean away from the nadir. `docs/explanation/aerial.md` has the bias.
 - **Not for** anything but simulation.
 
 | class | AP50 | wanted | met | distance of the centres, RMS |

@@ -3,7 +3,7 @@
     python xtask/training/mask_rcnn_evaluate.py --images DIR --empty DIR --crowded DIR --model sensors/models/rear-mask-rcnn.onnx \
                                           --card sensors/models/MASK_RCNN_CARD.md
 
-Average precisions are those of `pycocotools` at an overlap of one half. A vehicle counts from 20 px of visible width on, and
+Average precisions come from `pycocotools` at an overlap of one half. A vehicle counts from 20 px of visible width on, and
 what is found narrower and matches none does not count. In a band of distances, light or weather, vehicles outside of it neither
 count nor make a match wrong; false alarms count in every band of distances.
 
@@ -251,7 +251,7 @@ Finds cars, trucks and motorcycles in the image of the rear camera: boxes, class
   tenth crowded. {TRAINING.read_text(encoding="utf-8").strip()}
 - **Calibration**: one temperature, fitted on training scenes that were held back. Expected calibration error on the held-out images: {error:.3f}.
 - **Judged on** {len(truth["images"])} held-out images with {len(truth["annotations"])} vehicles: body shapes, paints and seeds that training never saw.
-  The tables are those of one seed, {truth["info"]["seed"]}; `docs/evidence/mask-rcnn.md` has those of four further seeds.
+  The tables are for one seed, {truth["info"]["seed"]}; `docs/evidence/mask-rcnn.md` has four further seeds.
 - **Misses** {100 * share_missed:.1f} % of the vehicles from 20 px on at a score of 0.5, in all lights and weathers.
 - **Has never seen**: a photograph; a lens with distortion, a rolling shutter; gantries, signs and trees; buses other than coaches, trailers behind cars,
   bicycles, pedestrians; snow, tunnels. What it says of photographs is not known.

@@ -6,7 +6,7 @@ Neither is trained: both find a car, a truck and a motorcycle in fixed boxes, wh
 first pixel, as shares of full brightness. A test thereby sees what the network was given.
 
 - `model-zoo.onnx` has the names, the order and the dynamic sides of `MaskRCNN-10.onnx` of the ONNX model zoo, masks of 28 x 28 cells, and
-  undoes its normalisation: the scores are those of blue, green and red.
+  undoes its normalisation: the scores are of blue, green and red.
 - `torchvision.onnx` has a batch of one image and the names of torchvision, and masks of the size of the image: the scores are those of red,
   green and blue.
 """

@@ -1,6 +1,6 @@
 """The Mask R-CNN of the rear camera: torchvision's, with a small backbone and small heads, and the graph that is exported.
 
-Positions are those of pixel centres: column 0 is at 0, so that a picture reaches from −0.5 to its width −0.5. With them the
+Positions are positions of pixel centres: column 0 is at 0, so that a picture reaches from −0.5 to its width −0.5. With them the
 cells of the feature maps, RoIAlign without half-pixel shift, and the masks agree.
 """
 
@@ -16,7 +16,7 @@ from torchvision.ops import FeaturePyramidNetwork, MultiScaleRoIAlign, nms, roi_
 
 import mask_rcnn_sampling as sampling
 
-# Names of the labels 1, 2, 3; 0 is the background. The order is that of the categories of `closecall tool render`.
+# Names of the labels 1, 2, 3; 0 is the background. The order is the order of the categories of `closecall tool render`.
 CLASSES = ("car", "truck", "motorcycle")
 # Channels of the levels of the backbone, whose cells are 2, 4, 8, 16 and 32 px wide, and of the pyramid.
 CHANNELS, PYRAMID = (16, 24, 48, 96, 128), 40

@@ -42,6 +42,8 @@ pub enum OpenReason {
     WeightedSamples,
     /// The samples are points of a design, and a bound of a probability needs independent ones.
     DependentSamples,
+    /// The bound is the end of the range of the value, or lies beyond it.
+    HoldsAlways,
 }
 
 impl OpenReason {
@@ -58,6 +60,9 @@ impl OpenReason {
             Self::WeightedSamples => {
                 "the samples of the design coverage visit each bin as often as any other, so that only a count, a smallest and a \
                  largest value say something"
+            }
+            Self::HoldsAlways => {
+                "it holds whatever happens in these samples, and says nothing of them: set a bound that can be missed"
             }
             Self::NothingVaries => "no parameter varies enough, so that no probability can be bounded",
             Self::SelfReported => {
@@ -85,7 +90,7 @@ pub struct Evidence {
 /// Smallest number of samples with which a gate on a count, a sum, a mean or an extreme is met (-):
 /// an assumption; 10 to 59 are plausible. An event that none of 20 samples shows has a probability
 /// of up to 14 %, with 95 % confidence.
-const LEAST_SAMPLES: u64 = 20;
+pub const LEAST_SAMPLES: u64 = 20;
 
 /// Returns the smallest number of samples with which a gate is met. A percentile needs enough
 /// samples to reach beyond it with the confidence of a bound: 59 for the 5th and the 95th, 299 for
@@ -172,6 +177,7 @@ impl Evaluation {
         let holds = |share: f64| expression.operator.holds(share, expression.bound);
         let answer = match covered {
             None => Answer::Open(OpenReason::NotInCoverage),
+            Some((_, samples)) if expression.holds_always(samples) => Answer::Open(OpenReason::HoldsAlways),
             Some((share, _)) if holds(share) => Answer::Met,
             Some(_) => Answer::Missed,
         };
@@ -285,7 +291,11 @@ impl Accumulator {
         let is_percentile = matches!(aggregate, Aggregate::Percentile(_));
         // Few samples do not show a percentile. Their count or extreme is a fact.
         let answer = if operator.holds(observed, bound) {
-            if is_enough { Answer::Met } else { Answer::Open(OpenReason::TooFewSamples) }
+            match is_enough {
+                true if self.expression.holds_always(samples) => Answer::Open(OpenReason::HoldsAlways),
+                true => Answer::Met,
+                false => Answer::Open(OpenReason::TooFewSamples),
+            }
         } else if is_percentile && !is_enough || is_bound && self.is_undecided(inference) {
             Answer::Open(OpenReason::TooFewSamples)
         } else {
@@ -420,15 +430,18 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
 mod tests {
     use super::*;
 
+    /// Independent samples of a scenario that varies, without a baseline.
+    const EVIDENCE: Evidence = Evidence {
+        is_paired: false,
+        is_varied: true,
+        is_built_in: [true; 2],
+        inference: Inference::FixedSamples,
+        is_weighted: false,
+    };
+
     /// Returns whether a gate of a flag is lost after these samples and hits.
     fn is_lost(gate: &str, hits: u64, samples: u64, rest: u64) -> bool {
-        let evidence = Evidence {
-            is_paired: true,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::FixedSamples,
-            is_weighted: false,
-        };
+        let evidence = Evidence { is_paired: true, ..EVIDENCE };
         Accumulator { hits, samples, ..Accumulator::new(gate.parse().unwrap()) }.is_lost(&evidence, rest)
     }
 
@@ -450,38 +463,59 @@ mod tests {
     }
 
     #[test]
-    fn an_extreme_beyond_its_bound_is_lost_and_a_mean_is_not() {
+    fn a_gate_that_no_sample_can_miss_is_open() {
         let evidence = Evidence {
-            is_paired: false,
+            is_paired: true,
             is_varied: true,
             is_built_in: [true; 2],
             inference: Inference::FixedSamples,
             is_weighted: false,
         };
+        let answer = |gate: &str| {
+            let expression: Expression = gate.parse().unwrap();
+            let (smallest, largest) = (Some(1.0), Some(2.0));
+            Accumulator { samples: 60, hits: 3, sum: 90.0, smallest, largest, ..Accumulator::new(expression) }
+                .evaluate(&evidence)
+                .answer
+        };
+        for gate in [
+            "count(ego_collided) >= 0",
+            "share(ego_collided) <= 1",
+            "upper(ego_collided) <= 1",
+            "lower(prevented | baseline.ego_collided) >= 0",
+            "max(max_jerk_mps3) <= 1e300",
+            "sum(harm) >= 0",
+        ] {
+            assert_eq!(answer(gate), Answer::Open(OpenReason::HoldsAlways), "{gate}");
+        }
+        for gate in ["count(ego_collided) <= 60", "share(ego_collided) >= 0.01", "max(max_jerk_mps3) <= 1000"] {
+            assert_eq!(answer(gate), Answer::Met, "{gate}");
+        }
+        let covered = |gate: &str| Evaluation::of_coverage(&gate.parse().unwrap(), Some((0.4, 60))).answer;
+        assert_eq!(covered("coverage(gap) >= 0"), Answer::Open(OpenReason::HoldsAlways));
+        assert_eq!(covered("coverage(gap) >= 0.4"), Answer::Met);
+    }
+
+    #[test]
+    fn an_extreme_beyond_its_bound_is_lost_and_a_mean_is_not() {
         let after = |gate: &str, value: f64| {
             let expression: Expression = gate.parse().unwrap();
             let (smallest, largest) = (Some(value), Some(value));
             Accumulator { samples: 30, sum: 30.0 * value, smallest, largest, ..Accumulator::new(expression) }
-                .is_lost(&evidence, 1_000)
+                .is_lost(&EVIDENCE, 1_000)
         };
         assert!(after("min(min_ttc_rear_s) >= 1", 0.5) && !after("min(min_ttc_rear_s) >= 1", 1.0));
         assert!(after("max(max_jerk_mps3) <= 5", 5.1) && !after("max(max_jerk_mps3) >= 5", 4.0));
         assert!(after("max(max_jerk_mps3) <= 5", f64::NAN), "what is not a number satisfies no bound");
         assert!(!after("mean(max_jerk_mps3) <= 5", 9.0) && !after("sum(harm) <= 5", 9.0));
-        let design = Evidence { inference: Inference::Sequential, ..evidence };
+        let design = Evidence { inference: Inference::Sequential, ..EVIDENCE };
         let gate = Accumulator { hits: 9, samples: 9, ..Accumulator::new("count(engaged) <= 0".parse().unwrap()) };
-        assert!(gate.is_lost(&evidence, 1) && !gate.is_lost(&design, 1));
+        assert!(gate.is_lost(&EVIDENCE, 1) && !gate.is_lost(&design, 1));
     }
 
     #[test]
     fn weighted_samples_decide_only_what_does_not_depend_on_how_often_they_happen() {
-        let evidence = Evidence {
-            is_paired: false,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::Design,
-            is_weighted: true,
-        };
+        let evidence = Evidence { inference: Inference::Design, is_weighted: true, ..EVIDENCE };
         let answer = |gate: &str| {
             let expression: Expression = gate.parse().unwrap();
             let gate = Accumulator { samples: 400, hits: 0, smallest: Some(2.0), ..Accumulator::new(expression) };
@@ -498,13 +532,6 @@ mod tests {
 
     #[test]
     fn an_extreme_and_a_percentile_say_how_sure_they_are() {
-        let evidence = Evidence {
-            is_paired: false,
-            is_varied: true,
-            is_built_in: [true; 2],
-            inference: Inference::FixedSamples,
-            is_weighted: false,
-        };
         let certainty = |gate: &str, values: &[f64], evidence: &Evidence| {
             let expression: Expression = gate.parse().unwrap();
             let samples = values.len() as u64;
@@ -514,13 +541,13 @@ mod tests {
         let values: Vec<f64> = (1..=299).rev().map(f64::from).collect();
         // 59 samples reach beyond the 95th percentile with 95 % confidence, and 58 do not.
         for (count, is_within) in [(58, false), (59, true)] {
-            let Some(Certainty::ShareBeyond(share)) = certainty("max(max_jerk_mps3) <= 5", &values[..count], &evidence)
+            let Some(Certainty::ShareBeyond(share)) = certainty("max(max_jerk_mps3) <= 5", &values[..count], &EVIDENCE)
             else {
                 panic!("an extreme has a share");
             };
             assert_eq!(share <= 0.05, is_within, "{count}: {share}");
         }
-        let bound = |gate: &str, count: usize| certainty(gate, &values[..count], &evidence);
+        let bound = |gate: &str, count: usize| certainty(gate, &values[..count], &EVIDENCE);
         assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 299), Some(Certainty::PercentileBound(1.0)));
         assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 298), None, "the smallest of 298 may be above");
         assert_eq!(bound("p99(max_jerk_mps3) <= 5", 299), Some(Certainty::PercentileBound(299.0)));
@@ -532,12 +559,12 @@ mod tests {
         for gate in ["mean(max_jerk_mps3) <= 5", "sum(harm) <= 5", "count(engaged) <= 5"] {
             assert_eq!(bound(gate, 299), None, "{gate}");
         }
-        let of_design = Evidence { inference: Inference::Design, ..evidence };
-        let of_one = Evidence { is_varied: false, ..evidence };
+        let of_design = Evidence { inference: Inference::Design, ..EVIDENCE };
+        let of_one = Evidence { is_varied: false, ..EVIDENCE };
         for other in [of_design, of_one] {
             assert_eq!(certainty("max(max_jerk_mps3) <= 5", &values, &other), None);
         }
-        assert_eq!(certainty("max(max_jerk_mps3) <= 5", &[1.0, f64::NAN], &evidence), None);
+        assert_eq!(certainty("max(max_jerk_mps3) <= 5", &[1.0, f64::NAN], &EVIDENCE), None);
     }
 
     #[test]

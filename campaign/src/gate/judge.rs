@@ -12,6 +12,7 @@ use super::course::{Course, asks_for_action, missing_action};
 use super::evaluate::{Accumulator, Evaluation, Evidence};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
+use crate::attribution;
 use crate::coverage::{CoverageCounter, CoverageResult};
 use crate::ledger::Inference;
 use crate::record::Record;
@@ -74,16 +75,25 @@ pub struct Judge {
     scenarios: Vec<Judged>,
 }
 
-/// Returns a message if a weaker controller stands in for the baseline of the scenario's function,
-/// and a check compares with the baseline. The collisions that it fails to prevent would count for
-/// the system under test. A controller from outside is the user's own baseline.
+/// Returns a message if another controller stands in for the baseline of the scenario's function,
+/// and a check or `MIS-9` compares with the baseline. The collisions that it fails to prevent would
+/// count for the system under test. A controller from outside is the user's own baseline.
 fn other_baseline(work: &Work) -> Option<String> {
     let config = work.file.config();
     let [baseline, _] = ControllerChoice::of_function(config.function);
     let arm = work.arms.first().filter(|arm| work.arms.len() > 1 && arm.controller.is_built_in())?;
     let (name, expected) = (arm.controller.name(), baseline.name());
-    let compares = config.checks.values().flatten().any(Expression::needs_pairs);
+    // MIS-9 allows the ego to slow down as much as the baseline does.
+    let is_attributed = config.requirements.iter().any(|mark| mark == attribution::REQUIREMENT);
+    let compares = is_attributed || config.checks.values().flatten().any(Expression::needs_pairs);
     (compares && name != expected).then(|| format!("the baseline is `{name}` and not `{expected}`"))
+}
+
+/// Returns what the settings, the gates and the baseline of a campaign demand less than the
+/// scenario file, or than the project file. A measurement demands nothing.
+fn overridden(work: &Work, set: &GateSet) -> Vec<String> {
+    let settings = work.file.config().overridden.iter().cloned();
+    settings.chain(set.weakened_in(&work.file)).chain(other_baseline(work)).collect()
 }
 
 impl Judge {
@@ -103,7 +113,7 @@ impl Judge {
                 least_share: config.expects_share,
                 happened: 0,
                 samples: 0,
-                overridden: config.overridden.iter().cloned().chain(other_baseline(work)).collect(),
+                overridden: overridden(work, set),
                 asks_for_action: asks_for_action(config),
                 function: config.function,
                 extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
@@ -152,6 +162,11 @@ impl Judge {
     pub fn overridden(&self) -> impl Iterator<Item = (&str, &[String])> {
         let judged = self.scenarios.iter().filter(|judged| !judged.overridden.is_empty());
         judged.map(|judged| (judged.scenario.as_str(), judged.overridden.as_slice()))
+    }
+
+    /// Returns the names of the scenarios.
+    pub fn scenarios(&self) -> impl Iterator<Item = &str> {
+        self.scenarios.iter().map(|judged| judged.scenario.as_str())
     }
 
     /// Returns the scenarios that ask what the system under test prevents, and in which it never

@@ -16,7 +16,7 @@ mod set;
 pub use assemble::{AssemblyError, PresetGates};
 pub(crate) use course::{Course, asks_for_action, missing_action};
 pub(crate) use evaluate::value;
-pub use evaluate::{Accumulator, Answer, Certainty, Evaluation, OpenReason};
+pub use evaluate::{Accumulator, Answer, Certainty, Evaluation, LEAST_SAMPLES, OpenReason};
 pub use judge::Judge;
 pub use options::GateOptions;
 pub use project::{ProjectError, ProjectFile};

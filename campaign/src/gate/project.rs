@@ -91,23 +91,30 @@ impl ProjectFile {
     }
 
     /// Adds the gates of the file that no gate of the set replaces. The set holds the gates of the
-    /// command line and of a preset.
+    /// command line and of a preset. A preset replaces no gate of the file that demands more.
     ///
     /// # Errors
     /// [`ProjectError`] if the largest probability or its confidence is out of range.
     pub fn add_to(self, set: &mut GateSet) -> Result<(), ProjectError> {
         let source = GateSource::ProjectFile(self.path.clone());
         for expression in self.gate.require {
+            let weaker = set.weaker_than(&expression);
+            set.weakened.extend(weaker);
+            set.drop_weaker_preset(&expression);
             set.push(GateSpec { expression, source: source.clone() });
         }
-        if let (None, Some(max)) = (&set.probability, self.gate.max_probability) {
+        if let Some(max) = self.gate.max_probability {
             let confidence = self.gate.confidence.unwrap_or(ProbabilityGate::CONFIDENCE);
             let gate = ProbabilityGate::new(max, confidence).map_err(|error| ProjectError {
                 path: self.path,
                 message: error.to_string(),
                 is_io: false,
             })?;
-            set.probability = Some(ProbabilitySpec { gate, source });
+            let weaker = set.weaker_than_probability(&gate);
+            set.weakened.extend(weaker);
+            if set.probability.is_none() {
+                set.probability = Some(ProbabilitySpec { gate, source });
+            }
         }
         Ok(())
     }
@@ -147,6 +154,34 @@ mod tests {
         write("[gate]\nrequire = ['share(engaged) <= 0.9', 'share(engaged) <= 0.5']\n");
         let message = ProjectFile::find(root.path()).unwrap_err().message;
         assert!(message.contains("<= 0.9") && message.contains("<= 0.5"), "{message}");
+    }
+
+    #[test]
+    fn a_gate_that_demands_less_than_the_gate_of_the_project_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        let text = "[gate]\nrequire = ['count(ego_collided) <= 3']\nmax-probability = 0.01\n";
+        std::fs::write(root.path().join(PROJECT_FILE), text).unwrap();
+        let weakened = |gate: &str, max_probability: Option<f64>| {
+            let mut set = GateSet::of([gate.parse().unwrap()]);
+            let gate = max_probability.map(|max| ProbabilityGate::new(max, ProbabilityGate::CONFIDENCE).unwrap());
+            set.probability = gate.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
+            ProjectFile::find(root.path()).unwrap().unwrap().add_to(&mut set).unwrap();
+            set.weakened
+        };
+        assert_eq!(
+            weakened("count(ego_collided) <= 39", Some(0.5)),
+            [
+                "gate count(ego_collided) <= 3, replaced by count(ego_collided) <= 39 (command line)",
+                "gate max-probability 0.01, replaced by 0.5 (command line)"
+            ]
+        );
+        for (gate, max_probability) in [
+            ("count(ego_collided) <= 3", None),
+            ("count(ego_collided) <= 0", Some(0.01)),
+            ("count(induced) <= 9", None),
+        ] {
+            assert_eq!(weakened(gate, max_probability), Vec::<String>::new(), "{gate}");
+        }
     }
 
     #[cfg(unix)]

@@ -68,6 +68,12 @@ impl GateResult {
         matches!(self.evaluation.answer, Answer::Met | Answer::Missed)
     }
 
+    /// Returns true if the gate judges the arm under test. A gate on the baseline alone does not, and a
+    /// gate that is not checked judges nothing.
+    pub fn judges_tested(&self) -> bool {
+        self.standing() != Standing::NotChecked && !self.expression.quantity.is_of_baseline()
+    }
+
     /// Returns a name that no other gate of the campaign has.
     pub fn name(&self) -> String {
         let scenario = &self.scenario;

@@ -115,9 +115,19 @@ pub struct ImportanceDetails {
     pub outside: f64,
     /// Searches that came to the event.
     pub searches: usize,
+    /// The largest weight that a run can have.
+    #[serde(skip)]
+    pub largest_weight: f64,
     /// Components of the mixture: each has a weight, and a mean and a standard deviation for each
     /// parameter.
     pub components: Vec<super::mixture::Component>,
+}
+
+impl ImportanceDetails {
+    /// Returns true if a few runs carry the estimate.
+    fn is_carried_by_few(&self) -> bool {
+        self.effective_events < FEW_EFFECTIVE || self.largest_share > LARGE_SHARE
+    }
 }
 
 /// Details of subset simulation.
@@ -179,6 +189,7 @@ impl RareReport {
             largest_share: result.largest_share,
             outside: result.outside,
             searches: result.searches,
+            largest_weight: 1.0 / result.mixture.defensive,
             components: result.mixture.components.clone(),
         };
         Self {
@@ -204,11 +215,28 @@ impl RareReport {
         self.estimates.last()
     }
 
+    /// Returns true if a few runs carry the estimate, or too much of it lies where no search led. The
+    /// mean of the weights may then be far from normal, so that its interval is no evidence.
+    pub fn is_doubtful(&self) -> bool {
+        self.importance.as_ref().is_some_and(|details| details.is_carried_by_few() || details.outside > LARGE_OUTSIDE)
+    }
+
+    /// Returns the one-sided upper bound of the probability by which a gate is judged: of a doubtful
+    /// estimate one that holds for any weights. `None` without an estimate or its bound.
+    pub fn upper_bound(&self, confidence: f64) -> Option<f64> {
+        let mean = &self.main()?.mean;
+        let bound = mean.upper_bound(confidence)?;
+        let largest_weight =
+            self.importance.as_ref().filter(|_| self.is_doubtful()).map(|details| details.largest_weight);
+        let of_any = largest_weight.map(|largest| mean.upper_bound_of_bounded(largest, confidence).min(1.0));
+        Some(of_any.map_or(bound, |of_any| of_any.max(bound)))
+    }
+
     /// Returns what makes the estimate doubtful, in words.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some(details) = self.importance.as_ref().filter(|_| !self.estimates.is_empty()) {
-            if details.effective_events < FEW_EFFECTIVE || details.largest_share > LARGE_SHARE {
+            if details.is_carried_by_few() {
                 warnings.push(format!(
                     "{:.0} effective runs carry the estimate, and one of them {:.0} % of it: another seed may differ by more than the interval",
                     details.effective_events,

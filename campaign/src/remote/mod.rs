@@ -1,5 +1,5 @@
 //! Campaigns whose samples run elsewhere, such as on a cluster. The campaign itself stays where it
-//! was started. Its folder, its journal, its gates and its reports equal those of a campaign on one
+//! was started. Its folder, its journal, its gates and its reports equal a campaign's on one
 //! machine, byte for byte.
 //!
 //! ```text

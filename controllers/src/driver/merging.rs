@@ -13,7 +13,7 @@
 //! - *Gap acceptance.* The change is mandatory: it gains nothing but the way. A gap is accepted if
 //!   neither the driver nor the follower in the through lane must brake harder than a limit, and if
 //!   a least gap is left to both ([`GapAcceptance`]). The limits grow towards the end of the lane,
-//!   as those of Vissim's necessary lane change do ([`tolerance`]). Recorded drivers leave short gaps
+//!   as in Vissim's necessary lane change ([`tolerance`]). Recorded drivers leave short gaps
 //!   when they merge, less than 0.25 s ahead and behind, which grow afterwards; in free traffic most
 //!   of them merge in the first half of the lane (Daamen, Loot and Hoogendoorn, *Empirical analysis
 //!   of merging behavior at freeway on-ramp*, Transportation Research Record 2188 (2010) 108–118).

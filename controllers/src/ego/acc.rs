@@ -133,7 +133,7 @@ pub(crate) enum GapPolicy {
     Unwatched,
 }
 
-/// Settings of the adaptive cruise control that replace those of a scenario.
+/// Settings of the adaptive cruise control that replace a scenario's settings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub(crate) struct AccPatch {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{MisPlan, Reason};
 
 /// The ego's measurement of its own motion, from wheel speeds, inertial sensors and lane camera.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Odometry {
     /// Speed (m/s).
     pub speed_mps: f64,
@@ -27,7 +27,7 @@ pub struct Odometry {
 }
 
 /// The groups of sensors that work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SensorAvailability {
     /// The front radar.
     pub front: bool,

@@ -89,7 +89,7 @@ impl EgoSettings {
         Self { mis: self.mis.map(|mis| MisSettings { horizon: Horizon::Ttce, ..mis }), ..self }
     }
 
-    /// Returns the same stack with emergency braking: that of the scenario, or one with the default values.
+    /// Returns the same stack with the scenario's emergency braking, or with one of default values.
     #[must_use]
     pub fn with_aeb(self) -> Self {
         Self { aeb: self.aeb.or(Some(Aeb::DEFAULT)), ..self }
@@ -155,7 +155,7 @@ impl EgoSettings {
     }
 }
 
-/// Settings of single functions that replace those of a scenario.
+/// Settings of single functions that replace a scenario's settings.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct StackPatch {

@@ -15,7 +15,7 @@
 //! command of the step before: while emergency braking acts, the comfort command goes on beneath
 //! it, and once emergency braking ends, the ego follows the comfort command at once. A ramp that
 //! started from the command of emergency braking would keep the ego braking for seconds after the
-//! lead vehicle has stopped braking. If a human drives, there is no comfort command: the command is that of emergency braking, and
+//! lead vehicle has stopped braking. If a human drives, there is no comfort command: emergency braking commands, and
 //! the loop lets the driver decide whenever emergency braking does not act. After emergency braking the MIS takes no further speed while
 //! the gap to the lead vehicle does not close.
 

@@ -7,7 +7,7 @@
 
 use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{EgoInput, Odometry};
 use crate::braking::Behind;
@@ -36,7 +36,7 @@ const PASSING_LANE_ENTRY_GAP_M: f64 = 40.0;
 const PASSING_LANE_EXIT_GAP_M: f64 = 10.0;
 
 /// The lead vehicle: the vehicle ahead in the lane of the ego.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Front {
     /// Number of its track.
     pub track: TrackId,

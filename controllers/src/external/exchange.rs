@@ -2,11 +2,12 @@
 
 use std::ffi::{CStr, CString};
 
-use crate::{EgoInput, EgoSettings, EgoState, Front};
-use closecall_traffic::{CONTROL_STEP, Road, Side, Source, TrackStatus};
+use closecall_traffic::{CONTROL_STEP, Road, Side, Time};
 use serde_json::Value;
 
 use crate::external::abi::{InputView, Setting, SetupView, Track};
+use crate::external::message::{RoadMessage, TrackMessage};
+use crate::{EgoInput, EgoSettings, EgoState, Front, Odometry, SensorAvailability};
 
 /// The data that a controller receives before its first step.
 #[derive(Clone, Debug)]
@@ -31,15 +32,18 @@ impl Setup {
     /// Returns the setup of a controller in this process.
     pub fn new(settings: &EgoSettings, road: &Road) -> Self {
         // Serialising structs of numbers and names cannot fail.
-        let settings = serde_json::to_value(settings).unwrap_or_default();
+        Self::on_road(&serde_json::to_value(settings).unwrap_or_default(), RoadMessage::of(road))
+    }
+
+    /// Returns a setup with these settings on this road.
+    pub(crate) fn on_road(settings: &Value, road: RoadMessage) -> Self {
         Self {
-            control_step_s: CONTROL_STEP.s(),
-            lane_width_m: road.lane_width_m(),
-            curvature_per_m: road.curvature_per_m(),
-            speed_limit_mps: road.speed_limit_mps(),
-            lanes: road.lanes().into(),
-            overtaking_side: road.overtaking_side(),
-            ..Self::of_settings(&settings)
+            lane_width_m: road.lane_width_m,
+            curvature_per_m: road.curvature_per_m,
+            speed_limit_mps: road.speed_limit_mps,
+            lanes: road.lanes.into(),
+            overtaking_side: road.overtaking_side,
+            ..Self::of_settings(settings)
         }
     }
 
@@ -145,30 +149,9 @@ impl Input {
 
     /// Sets the values of a control step. `front` is the lead vehicle.
     pub(crate) fn set(&mut self, input: &EgoInput<'_>, front: Option<Front>) {
-        let (odometry, lead) = (&input.odometry, front.as_ref());
-        self.view = InputView {
-            time_ns: input.time.ns(),
-            time_s: input.time.s(),
-            speed_mps: odometry.speed_mps,
-            acceleration_mps2: odometry.acceleration_mps2,
-            yaw_rate_radps: odometry.yaw_rate_radps,
-            lane_offset_m: odometry.lane_offset_m,
-            length_m: odometry.length_m,
-            width_m: odometry.width_m,
-            front_gap_m: lead.map_or(0.0, |lead| lead.gap_m),
-            front_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
-            front_acceleration_mps2: lead.map_or(0.0, |lead| lead.acceleration_mps2),
-            lane: odometry.lane.0.into(),
-            has_front: lead.is_some().into(),
-            front_track: lead.map_or(0, |lead| lead.track.0),
-            front_works: input.sensors.front.into(),
-            surround_works: input.sensors.surround.into(),
-            rear_works: input.sensors.rear.into(),
-            track_count: 0,
-            tracks: std::ptr::null(),
-        };
+        self.view = step_values(input.time, &input.odometry, front.as_ref(), input.sensors);
         self.tracks.clear();
-        self.tracks.extend(input.tracks.iter().map(of_track));
+        self.tracks.extend(input.tracks.iter().map(|track| Track::from(&TrackMessage::from(track))));
     }
 
     /// Returns the tracks, whose memory can be used again.
@@ -193,36 +176,33 @@ impl Input {
     }
 }
 
-fn of_track(track: &closecall_traffic::Track) -> Track {
-    let mut covariance = [0.0; 16];
-    for (index, value) in covariance.iter_mut().enumerate() {
-        *value = track.covariance[(index / 4, index % 4)];
-    }
-    Track {
-        id: track.id.0,
-        source: match track.source {
-            Source::Front => 0,
-            Source::Surround => 1,
-            Source::Rear => 2,
-        },
-        status: match track.status {
-            TrackStatus::Tentative => 0,
-            TrackStatus::Confirmed => 1,
-            TrackStatus::Coasting => 2,
-        },
-        reserved: 0,
-        time_s: track.time.s(),
-        x_m: track.x_m(),
-        y_m: track.y_m(),
-        vx_mps: track.vx_mps(),
-        vy_mps: track.vy_mps(),
-        covariance,
-        heading_rad: track.heading_rad,
-        length_m: track.length_m,
-        width_m: track.width_m,
-        class: track.class.0,
-        existence: track.existence,
-        lane: track.lane,
+/// Returns the values of a control step, without its tracks. `lead` is the lead vehicle.
+pub(crate) fn step_values(
+    time: Time,
+    odometry: &Odometry,
+    lead: Option<&Front>,
+    sensors: SensorAvailability,
+) -> InputView {
+    InputView {
+        time_ns: time.ns(),
+        time_s: time.s(),
+        speed_mps: odometry.speed_mps,
+        acceleration_mps2: odometry.acceleration_mps2,
+        yaw_rate_radps: odometry.yaw_rate_radps,
+        lane_offset_m: odometry.lane_offset_m,
+        length_m: odometry.length_m,
+        width_m: odometry.width_m,
+        front_gap_m: lead.map_or(0.0, |lead| lead.gap_m),
+        front_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
+        front_acceleration_mps2: lead.map_or(0.0, |lead| lead.acceleration_mps2),
+        lane: odometry.lane.0.into(),
+        has_front: lead.is_some().into(),
+        front_track: lead.map_or(0, |lead| lead.track.0),
+        front_works: sensors.front.into(),
+        surround_works: sensors.surround.into(),
+        rear_works: sensors.rear.into(),
+        track_count: 0,
+        tracks: std::ptr::null(),
     }
 }
 

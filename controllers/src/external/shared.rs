@@ -1,4 +1,4 @@
-//! A shared library with functions of another interface than that of controllers.
+//! A shared library with functions of any interface.
 
 #![expect(unsafe_code, reason = "functions of a loaded library are found by their names")]
 

@@ -53,7 +53,7 @@ pub enum Boxes {
     #[default]
     Detected,
     /// The exact boxes around all vehicles in the picture, also around hidden ones: what a perfect
-    /// detector would find. Errors that remain are those of the geometry.
+    /// detector would find. Errors that remain come from the geometry.
     Exact,
 }
 

@@ -38,7 +38,7 @@
 //!   keep their speeds along the road. A vehicle whose lane change is running keeps its lateral speed
 //!   until it is at the lateral position at which its lane change ends in the recording, and stays
 //!   there. All others keep their lateral positions. Boxes that do not move across the road point
-//!   along it. Results, horizon and condition are those of TTCE and DCE. The end of the lane change is
+//!   along it. Results, horizon and condition are as for TTCE and DCE. The end of the lane change is
 //!   known only in hindsight, as its window and its new lane are. The published thresholds come
 //!   without a motion model. They judge the encounters at constant velocity, which need no further
 //!   assumption, so shares and figures refer to these.

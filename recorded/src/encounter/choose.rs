@@ -36,7 +36,7 @@ pub enum ChoiceError {
 pub struct Wanted {
     /// Track that changes lanes; `None` for the most critical lane change.
     pub track: Option<u64>,
-    /// Number of the lane change among those of the track, in order of time, from 1 on; `None` for
+    /// Number of the lane change among the track's lane changes, in order of time, from 1 on; `None` for
     /// the most critical one.
     pub number: Option<usize>,
     /// Whether a lead vehicle is required.

@@ -87,14 +87,14 @@ impl Quantity {
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::CutOutThw => "headway to the old lane's lead at the crossing, lane changes to the left, at most 3 s",
-            Self::CriticalCutOutThw => "those of cut-out-thw-s that are critical: below 0.9 s",
+            Self::CriticalCutOutThw => "the values of cut-out-thw-s that are critical: below 0.9 s",
             Self::LaneChangeDuration => "whole manoeuvre of complete lane changes",
             Self::LaneChangeWidth => "peak width of complete lane changes",
             Self::Closing => "closing speed to the old lane's lead at the start, lane changes to the left, approaching",
             Self::CrossingSpeed => "speed at the crossing of all lane changes",
             Self::FrontThw => "median headway of each pair that follows for 2 s or more, at most 3 s",
             Self::ShortFrontThw => {
-                "those of front-thw-s that adaptive cruise control might keep and that are critical: 0.5 to 0.9 s"
+                "the values of front-thw-s that adaptive cruise control might keep and that are critical: 0.5 to 0.9 s"
             }
             Self::FollowingSpeed => "median speed of each pair that follows for 2 s or more",
         }

@@ -74,7 +74,7 @@ pub(super) struct Cloud {
 const READ: [&str; 9] = ["x", "y", "z", "intensity", "beam", "time", "timestamp", "offset_ns", "t"];
 
 impl Cloud {
-    /// Returns the points of which each takes `stride` bytes.
+    /// Returns the points. Each takes `stride` bytes.
     pub(super) fn of_bytes(
         fields: &[Field],
         (bytes, points, stride): (&[u8], usize, usize),

@@ -10,7 +10,7 @@ use super::text_table::read_table;
 
 /// Longest time between two labels of a vehicle between which it is interpolated (s).
 const LONGEST_GAP: Time = Time::from_ms(500);
-/// The columns of a table of labels, all of which are needed.
+/// The columns of a table of labels. All are needed.
 const COLUMNS: [&str; 9] = ["time_s", "id", "class", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m"];
 
 /// A vehicle at one time, in the ego's frame at that time.

@@ -1,6 +1,6 @@
 //! The compression LZF of `binary_compressed` PCD files.
 //!
-//! The format is that of liblzf by Marc Lehmann: a control byte below 32 introduces that many bytes
+//! The format is from liblzf by Marc Lehmann: a control byte below 32 introduces that many bytes
 //! and one, and any other a copy of earlier output. Its upper three bits are the length minus 2, or
 //! with 7 in the upper bits the next byte adds to it; the lower five bits and the following byte are
 //! the distance minus 1.
@@ -10,7 +10,7 @@ const LITERAL: u8 = 32;
 /// Length in the upper bits of a control byte from which on another byte adds to it.
 const LONG: usize = 7;
 
-/// Returns the data, of which there are `size` bytes.
+/// Returns the data, `size` bytes.
 pub(super) fn decompress(compressed: &[u8], size: usize) -> Result<Vec<u8>, &'static str> {
     const CUT: &str = "they end too early";
     let mut data: Vec<u8> = Vec::with_capacity(size.min(1 << 28));

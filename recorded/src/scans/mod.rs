@@ -81,7 +81,7 @@ impl Recording {
         companion(&self.path, name)
     }
 
-    /// Returns the poses of the recording: those of the file `poses` if it is given, else of the
+    /// Returns the poses of the recording: from the file `poses` if it is given, else from the
     /// MCAP file, else of the file that goes with the recording.
     ///
     /// # Errors

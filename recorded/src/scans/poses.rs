@@ -175,7 +175,7 @@ impl Poses {
             return Ok((*road, VehicleState { s_m, d_m, heading_rad, ..state }));
         }
         let path_per_m = self.curvature_per_m(before);
-        // The curvature of a road is that of its left edge, where d is 0.
+        // The curvature of a road is the curvature of its left edge, where d is 0.
         let road = road.with_curvature(path_per_m / (1.0 + path_per_m * d_m));
         // A metre of the left edge is longer or shorter than a metre of the ego's path.
         let s_m = mixed(&|index| self.driven_m[index]) / (1.0 - road.curvature_per_m() * d_m);

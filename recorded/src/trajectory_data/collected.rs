@@ -40,7 +40,7 @@ const UNEVENNESS: f64 = 0.02;
 
 /// Lateral movement within one step that makes a lane change a jump (m): half a narrow lane.
 const JUMP_M: f64 = 1.5;
-/// Lateral speed of such a jump (m/s): twice that of the fastest lane changes.
+/// Lateral speed of such a jump (m/s): twice as fast as the fastest lane changes.
 const JUMP_MPS: f64 = 4.0;
 /// Lateral reach above which a vehicle changes lanes (m): half a lane, and above the swaying of two
 /// drivers.
@@ -70,7 +70,7 @@ pub(super) enum Position {
         /// The lane that the file names.
         named_lane: Option<StatedLane>,
     },
-    /// On a road, of which a file may hold several. `s_m` is the centre of the vehicle's box.
+    /// On a road. A file may hold several. `s_m` is the centre of the vehicle's box.
     Road { road: u32, s_m: f64, d_m: f64, lane: u8 },
 }
 

@@ -146,7 +146,7 @@ impl Continuity {
         }
         if self.jumps > 0 {
             warnings.push(format!(
-                "{} jumps that no vehicle makes, at each of which the track was split: a number may belong to several vehicles",
+                "{} jumps that no vehicle makes. The track was split at each: a number may belong to several vehicles",
                 self.jumps
             ));
         }

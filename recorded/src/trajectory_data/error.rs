@@ -294,7 +294,7 @@ pub enum TrajectoryFileProblem {
     },
     /// The file is the tracks file of a highD or exiD data set, and its metadata files are missing.
     #[error(
-        "the header is that of highD's or exiD's tracks, which need the files with their metadata beside them: \
+        "the header belongs to highD's or exiD's tracks, which need the files with their metadata beside them: \
          NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv"
     )]
     NeedsMetadata,
@@ -382,7 +382,7 @@ pub enum TrajectoryFileProblem {
         line: u64,
     },
     /// A track has a gap, but no free track number is left for its pieces.
-    #[error("track {track} has a gap, but its number is that of a piece already; numbers of vehicles lie below 10¹²")]
+    #[error("track {track} has a gap, but a piece already has its number; numbers of vehicles lie below 10¹²")]
     SplitPiece {
         /// Number of the track.
         track: u64,

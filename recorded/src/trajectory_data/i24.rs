@@ -6,7 +6,7 @@
 //!
 //! - `timestamp`: seconds since 1970. `x_position`: middle of the *rear* along the road (feet);
 //!   `direction` 1 is towards increasing, −1 towards decreasing x. `y_position`: across the road
-//!   (feet); 0 is the left edge of the leftmost lane in either direction, and its sign is that of the
+//!   (feet); 0 is the left edge of the leftmost lane in either direction, and it has the sign of the
 //!   direction.
 //! - `length`, `width` in feet. `coarse_vehicle_class`: 0 sedan, 1 midsize, 2 van, 3 pickup, 4 semi,
 //!   5 truck, 6 motorcycle.

@@ -68,7 +68,7 @@ const ASTRAY_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
 const ASTRAY_M: f64 = 35.0;
 
 /// Share of rows that go astray above which a reader of results is warned, and the share above which
-/// the traffic is not that of a road. Ramps of motorways stay below the first. Assumptions.
+/// the traffic is not on a road. Ramps of motorways stay below the first. Assumptions.
 const WARNED_SHARE: f64 = 0.05;
 const REFUSED_SHARE: f64 = 0.5;
 

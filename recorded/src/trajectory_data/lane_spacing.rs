@@ -82,7 +82,7 @@ pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
 /// Returns the question for the likely cause of lanes that are too far apart, or too close.
 pub(super) fn suspected_cause(layout: Layout, is_too_wide: bool) -> &'static str {
     match (layout, is_too_wide) {
-        (Layout::Plain, true) => "is `d_m` in feet, of which each has 0.3048 m?",
+        (Layout::Plain, true) => "is `d_m` in feet (0.3048 m)?",
         (Layout::Plain, false) => {
             "is `d_m` the distance from the middle of each lane, converted to metres twice, or in another unit?"
         }

@@ -40,7 +40,7 @@ const VISSIM: [&[u8]; 3] = [b"$V", b"* ", b"Vehicle Record"];
 
 /// A field of I-24 MOTION, which stands near the start of its files.
 const I24: &[u8] = b"\"x_position\"";
-/// Fields of I-24 MOTION, one of which stands at the start of its files.
+/// Fields of I-24 MOTION. One of them is at the start of its files.
 const I24_START: [&[u8]; 3] = [b"\"timestamp\"", b"\"coarse_vehicle_class\"", b"\"configuration_id\""];
 
 /// A word at the start of SUMO's floating car data, and one of CommonRoad's.

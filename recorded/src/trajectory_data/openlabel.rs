@@ -240,7 +240,7 @@ const EPOCH_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
 
 /// Returns the class that the type of an object names.
 fn class_of(kind: &str, unknown: &mut UnknownClasses) -> VehicleClass {
-    // The type may be an address, such as that of a term of an ontology.
+    // The type may be an address, such as the address of a term of an ontology.
     let term = kind.rsplit(['#', '/', ':']).next().unwrap_or(kind);
     let known = VehicleClass::ALL.into_iter().find(|class| {
         names::vehicle_type(*class).eq_ignore_ascii_case(term) || class.name().eq_ignore_ascii_case(term)
@@ -460,7 +460,7 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
 mod tests {
     use super::*;
 
-    /// A file with one car in two frames, of which the second has these numbers.
+    /// A file with one car in two frames. The second has these numbers.
     fn file(second: &str) -> String {
         let road = names::ROAD;
         let frame = |time_s: f64, s_m: f64, numbers: &str| {

@@ -3,8 +3,8 @@
 //! | order | rows held in memory |
 //! |---|---|
 //! | any, up to [`WINDOW_ROWS`] rows | all |
-//! | by vehicle: the rows of one vehicle are consecutive | those of one vehicle |
-//! | by time: no row is earlier than the one before | those of the vehicles on the road at that time |
+//! | by vehicle: the rows of one vehicle are consecutive | the rows of one vehicle |
+//! | by time: no row is earlier than the one before | the rows of the vehicles on the road at that time |
 //!
 //! NGSIM's original files and highD's are sorted by vehicle. The reader rejects longer unsorted
 //! files, with the line at which the order breaks: sorting them needs disk space, and `sort` does

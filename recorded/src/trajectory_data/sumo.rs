@@ -37,7 +37,7 @@ use super::source::{Clock, ReadError};
 use super::stated_lanes::StatedLane;
 use super::xml::{Node, Xml};
 
-/// The attributes of a vehicle that the reader uses, and that of a time step.
+/// The attributes of a vehicle, and of a time step, that the reader uses.
 const ATTRIBUTES: &[&str] = &["time", "id", "x", "y", "angle", "type", "speed", "lane", "acceleration"];
 
 const ANGLE_DEG: Bounds = Bounds::closed(-360.0, 720.0);
@@ -109,7 +109,7 @@ pub(super) fn read_xml(input: impl BufRead) -> Result<CollectedSource, ReadError
     reader.finish()
 }
 
-/// Returns `true` if `header` is that of a table of FCD. Its columns are named after the element
+/// Returns `true` if `header` belongs to a table of FCD. Its columns are named after the element
 /// and its attribute, or after the attribute alone.
 pub(super) fn is_table(header: &Header) -> bool {
     header.find("timestep_time").is_some() || header.count(&["time", "id", "x", "y", "angle", "speed", "lane"]) == 7

@@ -64,29 +64,18 @@ impl<R: BufRead> TextSource<R> {
         }
         let format = drone_format(&first, meta().map_err(Err)?, infer_road)
             .map_err(|error| error.map(|problem| ReadError::new(number, problem)))?;
-        Ok(Self {
-            lines,
-            format,
-            fields: Fields::default(),
-            name: None,
-            first: None,
-            usual_last_field: 0,
-            location: Location::default(),
-        })
+        Ok(Self::at_start(lines, format, None))
     }
 
     fn with_recognised_layout(lines: Lines<R>, number: u64, first: String) -> Result<Self, ReadError> {
         let format = recognise(&first).map_err(|problem| ReadError::new(number, problem))?;
         let first = (!format.has_header).then_some((number, first));
-        Ok(Self {
-            lines,
-            format,
-            fields: Fields::default(),
-            name: None,
-            first,
-            usual_last_field: 0,
-            location: Location::default(),
-        })
+        Ok(Self::at_start(lines, format, first))
+    }
+
+    fn at_start(lines: Lines<R>, format: Format, first: Option<(u64, String)>) -> Self {
+        let (fields, location) = (Fields::default(), Location::default());
+        Self { lines, format, fields, name: None, first, usual_last_field: 0, location }
     }
 }
 

@@ -142,7 +142,7 @@ fn read(name: &str, bytes: &[u8], lanes: LaneReliability) -> Result<TrajectoryDa
     open_from(bytes, Path::new(name), options, usize::MAX)?.collect_all()
 }
 
-/// Asserts that the only lane change is that of car 5.
+/// Asserts that only car 5 changes lanes.
 fn assert_lane_change(data: &TrajectoryData) -> LaneChange {
     assert_eq!(data.layout, Layout::Osi);
     assert!(data.notes.iter().any(|note| note.starts_with("400 moving objects")), "{:?}", data.notes);
@@ -175,7 +175,7 @@ fn a_trace_without_lanes_is_read_if_they_are_to_be_estimated() {
     assert!(matches!(error.problem, TrajectoryFileProblem::NoLanes { .. }), "{error}");
     // The vehicle that changes lanes has the longest path: it must not become the reference.
     assert_lane_change(&read("run.osi", &bytes, LaneReliability::Unreliable).unwrap());
-    // Lanes of which a boundary is missing are none.
+    // A lane without one of its boundaries is no lane.
     let (lane, mut boundaries) = lanes(true);
     boundaries.clear();
     let error = read("run.osi", &trace(&messages(Some((lane, boundaries)))), LaneReliability::Reliable).unwrap_err();

@@ -692,7 +692,7 @@ fn malformed_parquet_is_refused() {
     }
 }
 
-/// Writes a data set with exiD's columns, of which `columns` are left out.
+/// Writes a data set with exiD's columns without `columns`.
 fn exid(folder: &Path, without: &[&str], changes_flagged: bool) {
     let all = [
         "recordingId",
@@ -714,7 +714,7 @@ fn exid(folder: &Path, without: &[&str], changes_flagged: bool) {
     let line = |values: &[String]| kept.iter().map(|index| values[*index].clone()).collect::<Vec<_>>().join(",") + "\n";
     let mut rows = line(&all.map(str::to_owned));
     let mut meta = "recordingId,trackId,numFrames,class\n".to_owned();
-    // The longest path is that of the vehicle that changes lanes.
+    // The vehicle that changes lanes has the longest path.
     for (vehicle, lane, speed_mps) in [(1, 0.0, 25.0), (2, 0.0, 33.0), (3, 1.0, 26.0), (4, 1.0, 24.0)] {
         writeln!(meta, "5,{vehicle},300,car").unwrap();
         for frame in 0..300_u32 {

@@ -10,7 +10,7 @@ use closecall_recorded::trajectory_data::{ReadOptions, STREAM_ROWS, count_flaws,
 /// Rows of one made-up vehicle.
 const ROWS: usize = 120;
 
-/// Writes more rows than are held at once: vehicles in two lanes, of which every third changes lanes.
+/// Writes more rows than are held at once: vehicles in two lanes. Every third changes lanes.
 fn write_long(path: &Path, by_time: bool) {
     let vehicles = STREAM_ROWS / ROWS + 40;
     let row = |vehicle: usize, frame: usize| {

@@ -77,7 +77,18 @@ impl fmt::Display for BaselineText<'_> {
         for scenario in &self.0.new_scenarios {
             writeln!(f, "{scenario}: not in the baseline, and not compared")?;
         }
-        writeln!(f, "{}", if self.0.is_regression() { "REGRESSION" } else { "NO REGRESSION" })
+        for scenario in &self.0.without_outcome {
+            writeln!(f, "{scenario}: every sample ended in an error, and nothing was compared")?;
+        }
+        writeln!(
+            f,
+            "{}",
+            match self.0.is_regression() {
+                true => "REGRESSION",
+                false if self.0.is_compared() => "NO REGRESSION",
+                false => "NOT COMPARED",
+            }
+        )
     }
 }
 

@@ -12,7 +12,7 @@
 //! `samples.xml`.
 //!
 //! By the convention of JUnit, the time of a suite is the sum of the times of its cases, and not the
-//! time on the clock while they ran side by side. The time of a suite is that of its samples, summed
+//! time on the clock while they ran side by side. The time of a suite is the time of its samples, summed
 //! over all threads. Its cases are judged on the same samples: each has an equal share of the time.
 //!
 //! Both files are valid by the schema of Jenkins' plugin xUnit (`junit-10.xsd`). The library

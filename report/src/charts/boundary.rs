@@ -4,7 +4,7 @@ use std::io;
 
 use plotters::prelude::*;
 
-use super::style::{COLLISIONS, ChartAxis, Drawn, FILE_PX, Plot, axes, fate_colour, number_text, svg};
+use super::style::{COLLISIONS, ChartAxis, Drawn, FILE_PX, Plot, axes, fate_colour, file_svg, number_text};
 use crate::campaign::overview::Fate;
 use crate::units::labelled;
 
@@ -55,7 +55,7 @@ pub(crate) fn boundary_map(map: &BoundaryMap<'_>) -> io::Result<String> {
         text: Box::new(number_text(map.ranges[index][0], map.ranges[index][1])),
         has_grid: true,
     };
-    let drawn = svg(FILE_PX, |canvas| {
+    let drawn = file_svg(FILE_PX, |canvas| {
         let mut plot = axes(canvas, Some(map.title), &axis(0), &axis(1))?;
         draw_places(&mut plot, map)?;
         for [from, to] in segments(map.means) {

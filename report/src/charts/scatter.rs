@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::style::{ChartAxis, FILE_PX, axes, label_text, number_text, svg};
+use super::style::{ChartAxis, FILE_PX, axes, file_svg, label_text, number_text};
 
 /// One point.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +48,7 @@ pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) ->
         text: Box::new(number_text(range.start, range.end)),
         has_grid: true,
     };
-    let drawn = svg(FILE_PX, |canvas| {
+    let drawn = file_svg(FILE_PX, |canvas| {
         let mut plot = axes(canvas, Some(title), &axis(names[0], &across), &axis(names[1], &up))?;
         // Marked points are drawn last, over the others.
         let (marked, others): (Vec<&ScatterPoint>, Vec<&ScatterPoint>) =

@@ -183,12 +183,19 @@ pub(crate) fn axes<'a, 'b>(
 }
 
 /// Returns the SVG of a chart of this size (px).
-pub(crate) fn svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> Drawn<String> {
+fn svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> Drawn<String> {
     let mut text = String::new();
     let canvas = SVGBackend::with_string(&mut text, size_px).into_drawing_area();
     let drawn = paint(&canvas).and_then(|()| canvas.present());
     drop(canvas);
     drawn.map(|()| text)
+}
+
+/// Returns the SVG of a chart of this size (px) that can stand in a file of its own. It has a white background: viewers
+/// show what is not drawn in any colour, some in black. The style sheet of the pages leaves the background out where a
+/// page is dark.
+pub(crate) fn file_svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> Drawn<String> {
+    svg(size_px, |canvas| canvas.fill(&WHITE).and_then(|()| paint(canvas)))
 }
 
 /// Returns a chart that stands inside a page: it shrinks with the page, and is at most this large
@@ -264,6 +271,21 @@ mod tests {
         let style = include_str!("../campaign/html/style.css");
         assert!(style.contains("--sheet: #fff;") && style.contains("--sheet: #1c2228;"));
         assert!(style.contains("filter: invert(1) hue-rotate(180deg)"));
+    }
+
+    #[test]
+    fn a_chart_in_a_file_has_a_background_below_all_else_which_a_dark_page_leaves_out() {
+        let paint = |canvas: &Canvas<'_>| canvas.draw(&Circle::new((5, 5), 2, BLACK));
+        let background = "<rect x=\"0\" y=\"0\" width=\"420\" height=\"220\" opacity=\"1\" fill=\"#FFFFFF\"";
+        let chart = file_svg(SMALL_PX, paint).unwrap();
+        let at = |text: &str| chart.find(text).unwrap_or_else(|| panic!("{text}: {chart}"));
+        assert!(at(background) < at("<circle") && chart.find("<rect") == Some(at(background)), "{chart}");
+        // A chart that is part of a page alone lies on the sheet of the page.
+        assert!(!inline(SMALL_PX, paint).unwrap().into_string().contains("<rect"));
+        let style = include_str!("../campaign/html/style.css");
+        let (_, dark) = style.split_once("@media screen and (prefers-color-scheme: dark) { figure svg").unwrap();
+        let rule = "figure svg > rect[fill=\"#ffffff\" i]:first-of-type { fill: none; }";
+        assert!(dark.split("@media").next().unwrap().contains(rule), "{dark}");
     }
 
     #[test]

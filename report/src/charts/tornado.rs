@@ -8,7 +8,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::style::{Canvas, Drawn, GREY, GRID, label_text, number_text, svg};
+use super::style::{Canvas, Drawn, GREY, GRID, file_svg, label_text, number_text};
 
 /// One bar.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ pub(crate) fn tornado(bars: &[TornadoBar], centre: f64, texts: TornadoTexts<'_>)
     let rows = i32::try_from(bars.len()).unwrap_or(i32::MAX);
     let bottom_px = TOP_PX + ROW_PX * rows;
     let size = (WIDTH_PX.unsigned_abs(), (bottom_px + BOTTOM_PX).unsigned_abs());
-    let drawn = svg(size, |canvas| {
+    let drawn = file_svg(size, |canvas| {
         draw_scale(canvas, &scale, bottom_px, texts.scale)?;
         let heads_px = [(NAMES_PX, HPos::Right), (SCALE_PX[0], HPos::Left), (NOTES_PX, HPos::Left)];
         for (text, (x_px, side)) in texts.heads.iter().zip(heads_px) {

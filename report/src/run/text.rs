@@ -3,7 +3,7 @@
 use std::fmt;
 
 use closecall_scenarios::causal::VehicleLetters;
-use closecall_scenarios::outcome::{Collision, MisSummary, Moment, Outcome, ReasonSpan};
+use closecall_scenarios::outcome::{Collision, Moment, Outcome};
 use closecall_traffic::Measured;
 
 /// Returns a touch in words.
@@ -23,24 +23,6 @@ pub fn outcome_line(outcome: &Outcome) -> String {
     let (sample, controller) = (outcome.sample, &outcome.controller);
     let line = format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}");
     line.trim_end().to_owned()
-}
-
-/// Returns the reason of the system, with the time in which it could have engaged if it never did.
-pub(super) fn reason_text(mis: &MisSummary) -> String {
-    match (mis.engaged_at_s, mis.decided_s) {
-        (Err(_), Some([from_s, until_s])) => {
-            let held =
-                |span: &&ReasonSpan| span.reason == mis.reason && span.until_s > from_s && span.from_s <= until_s;
-            let (first, last) = (mis.reasons.iter().find(held), mis.reasons.iter().rfind(held));
-            match first.zip(last) {
-                Some((first, last)) => {
-                    format!("{}, {:.1} to {:.1} s", mis.reason, first.from_s.max(from_s), last.until_s.min(until_s))
-                }
-                None => mis.reason.to_string(),
-            }
-        }
-        _ => mis.reason.to_string(),
-    }
 }
 
 /// The outcome of a run as text for human readers, over several lines.
@@ -107,7 +89,7 @@ impl fmt::Display for OutcomeText<'_> {
                     |reached| format!("when {}", letters.moment_text(reached)),
                 );
                 f.write_str(&line(&format!("  front time headway {when}"), mis.thw_front_at_critical_s, "s"))?;
-                writeln!(f, "  MIS: {}", reason_text(mis))
+                writeln!(f, "  MIS: {}", mis.reason_words())
             }
             Err(_) => Ok(()),
         }

@@ -14,7 +14,7 @@ use crate::charts::{ScatterPoint, scatter};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AnchorText<'a>(pub(super) &'a Anchor);
 
-/// The names of the columns behind that of the name.
+/// The names of the columns behind the column of the name.
 pub(super) const HEADS: [&str; 5] =
     ["samples", "strikes without, with", "ratio (95 %)", "struck without, with", "ratio (95 %)"];
 

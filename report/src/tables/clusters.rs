@@ -262,7 +262,7 @@ fn truth_of(points: &[u32], source: &dyn Fn(u32) -> PointSource, view: &StepView
     Some((name, most as f64 / points.len() as f64))
 }
 
-/// Returns a detection in the ego's frame. `sign` is −1 for that of a LiDAR that looks ahead.
+/// Returns a detection in the ego's frame. `sign` is −1 for a LiDAR that looks ahead.
 fn turned(detection: &Detection, sign: f64) -> Detection {
     Detection { face_x_m: sign * detection.face_x_m, face_y_m: sign * detection.face_y_m, ..detection.clone() }
 }

@@ -22,12 +22,11 @@ use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::{Arm, RunKey, SampleError};
 use closecall_traffic::metrics::{bumper_gap_m, time_headway_s};
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
-use plotters::prelude::*;
 use serde::Serialize;
 
 use super::reproduction::Reproduction;
 use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
-use crate::charts::style::{Canvas, Drawn, svg};
+use crate::charts::style::{Canvas, Drawn, file_svg};
 use crate::run::film::{Film, TrafficFilmError, film_lane_change};
 use closecall_simulation::trajectories::TrafficRecorder;
 
@@ -334,13 +333,12 @@ impl Sampled {
     pub fn figure(&self) -> Result<String, ChartError> {
         let charts = self.charts();
         let draw = |canvas: &Canvas<'_>| -> Drawn {
-            canvas.fill(&WHITE)?;
             for (area, chart) in canvas.split_evenly((charts.len(), 1)).iter().zip(&charts) {
                 chart.draw(area)?;
             }
             Ok(())
         };
-        svg(FIGURE_PX, draw).map_err(|error| ChartError { title: self.title.clone(), message: error.to_string() })
+        file_svg(FIGURE_PX, draw).map_err(|error| ChartError { title: self.title.clone(), message: error.to_string() })
     }
 
     fn charts(&self) -> Vec<LineChart> {

@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use crate::charts::style::{Canvas, ChartAxis, Drawn, FILE_PX, axes, legend_text, number_text, series_colour, svg};
+use crate::charts::style::{
+    Canvas, ChartAxis, Drawn, FILE_PX, axes, file_svg, legend_text, number_text, series_colour,
+};
 
 /// Opacity of a faint line.
 const FAINT_OPACITY: f64 = 0.35;
@@ -290,7 +292,7 @@ pub(super) fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Resu
 
 /// Returns the SVG of a chart of this size (px) on a white background.
 fn sized_file(title: &str, size_px: (u32, u32), draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
-    let drawn = svg(size_px, |canvas| canvas.fill(&WHITE).and_then(|()| draw(canvas)));
+    let drawn = file_svg(size_px, draw);
     drawn.map_err(|error| ChartError { title: title.to_owned(), message: error.to_string() })
 }
 

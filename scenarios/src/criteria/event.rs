@@ -13,7 +13,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::expression::{Quantity, parse_quantity};
-use super::measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind};
+use super::measure::{EGO_COLLIDED, LARGEST, MEASURES, Measure, MeasureKind};
 
 /// Another name of the collision of the ego.
 const COLLISION: &str = "collision";
@@ -60,6 +60,18 @@ impl Event {
             Some((Comparison::Above, bound)) => value > bound,
             Some((Comparison::AtLeast, bound)) => value >= bound,
         }
+    }
+
+    /// Returns true if the event happens in every run or in none, whatever happens there: no value of
+    /// the number lies on both sides of the bound.
+    fn is_constant(&self) -> bool {
+        let Some((comparison, bound)) = self.bound else { return false };
+        let is_beyond = |least: f64| match comparison {
+            Comparison::Below | Comparison::AtLeast => bound <= least,
+            Comparison::AtMost | Comparison::Above => bound < least,
+        };
+        let least = self.quantity.measure().and_then(|(measure, _)| measure.least());
+        bound.abs() > LARGEST || least.is_some_and(is_beyond)
     }
 
     /// Returns how far a value is beyond the bound, negative if the event does not happen; `None`
@@ -151,9 +163,13 @@ fn parse_event(text: &str) -> Result<Event, String> {
     if quantity.is_flag() {
         return Err(format!("`{quantity}` is a flag, which has no bound: write `{quantity}`"));
     }
-    match bound.trim().parse::<f64>() {
-        Ok(bound_value) if bound_value.is_finite() => Ok(Event { quantity, bound: Some((comparison, bound_value)) }),
-        _ => Err(format!("the bound `{}` is not a finite number", bound.trim())),
+    let event = match bound.trim().parse::<f64>() {
+        Ok(bound_value) if bound_value.is_finite() => Event { quantity, bound: Some((comparison, bound_value)) },
+        _ => return Err(format!("the bound `{}` is not a finite number", bound.trim())),
+    };
+    match event.is_constant() {
+        true => Err(format!("no value of `{quantity}` lies on the other side of {}", bound.trim())),
+        false => Ok(event),
     }
 }
 
@@ -204,6 +220,8 @@ mod tests {
             "min_ttc_rear_s <= 0.001",
             "max_jerk_mps3 > 20",
             "baseline.min_gap_rear_m >= -1",
+            "harm > 0",
+            "impact_speed_mps <= 0",
             "baseline.ego_collided - ego_collided",
         ] {
             let event: EventExpression = text.parse().unwrap();
@@ -223,6 +241,12 @@ mod tests {
             ("min_ttc_rear_s < nan", "not a finite number"),
             ("min_ttc_rear_s < inf", "not a finite number"),
             ("min_ttc_rear_s < ", "not a finite number"),
+            ("min_ttc_rear_s < -1e9", "no value of `min_ttc_rear_s` lies on the other side of -1e9"),
+            ("max_jerk_mps3 < 1e9", "on the other side"),
+            ("harm < 0", "on the other side"),
+            ("harm >= 0", "on the other side"),
+            ("baseline.delta_v_mps > -1", "on the other side"),
+            ("duration_s <= -0.1", "on the other side"),
             ("induced - induced", "itself is 0"),
             ("count(induced) <= 0", "not a measure"),
         ] {

@@ -22,7 +22,7 @@ use std::str::FromStr;
 
 use crate::coverage::CoverageName;
 
-use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
+use super::measure::{LARGEST, MEASURES, Measure, MeasureKind, PairFlag};
 
 /// A value that is computed from all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +88,16 @@ impl Comparison {
         };
         if value.is_nan() { value } else { f64::from(u8::from(holds)) }
     }
+
+    /// Returns true if the flag is the same in every sample: no value of the number lies on both
+    /// sides of the threshold.
+    fn is_constant(&self) -> bool {
+        let is_beyond = |least: f64| match self.side {
+            Side::Above => self.threshold < least,
+            Side::Below => self.threshold <= least,
+        };
+        self.threshold.abs() > LARGEST || self.measure.least().is_some_and(is_beyond)
+    }
 }
 
 /// The value of one sample that is aggregated.
@@ -106,6 +116,16 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// Returns true if the quantity is one of the baseline alone, and says nothing of the arm under
+    /// test.
+    pub const fn is_of_baseline(self) -> bool {
+        match self {
+            Self::Tested(_) | Self::Pair(_) | Self::Covered(_) => false,
+            Self::Baseline(_) => true,
+            Self::Compared(comparison) => comparison.in_baseline,
+        }
+    }
+
     /// Returns true if the quantity exists only in a paired campaign.
     pub const fn needs_pairs(self) -> bool {
         match self {
@@ -199,6 +219,52 @@ impl Expression {
             };
             Some([*gates[..index].iter().find(is_other)?, *later])
         })
+    }
+
+    /// Returns true if the gate bounds the same value on the same side as `other`, and no less.
+    pub fn is_as_strict_as(&self, other: &Self) -> bool {
+        let is_bound_kept = match other.operator {
+            Operator::AtMost => self.bound <= other.bound,
+            Operator::AtLeast => self.bound >= other.bound,
+        };
+        self.bounds_as(other) && is_bound_kept
+    }
+
+    /// Returns true if the gate bounds the same value on the same side as `other`.
+    pub fn bounds_as(&self, other: &Self) -> bool {
+        self.operator == other.operator && self.subject() == other.subject()
+    }
+
+    /// Returns true if `samples` samples that have the value cannot miss the gate, whatever happens
+    /// in them: the bound is the end of the range of the value, or lies beyond it. Such a gate says
+    /// nothing.
+    pub fn holds_always(&self, samples: u64) -> bool {
+        let Self { aggregate, quantity, operator, bound, .. } = *self;
+        if matches!(quantity, Quantity::Compared(comparison) if comparison.is_constant()) {
+            return true;
+        }
+        let least = || quantity.measure().and_then(|(measure, _)| measure.least());
+        match (aggregate, operator) {
+            // The allowed number may be fixed while the number of samples varies.
+            (Aggregate::Count, Operator::AtMost) => false,
+            (Aggregate::Share | Aggregate::Lower | Aggregate::Upper | Aggregate::Coverage, Operator::AtMost) => {
+                bound >= 1.0
+            }
+            (
+                Aggregate::Count | Aggregate::Share | Aggregate::Lower | Aggregate::Upper | Aggregate::Coverage,
+                Operator::AtLeast,
+            ) => bound <= 0.0,
+            (Aggregate::Sum, Operator::AtMost) => bound > LARGEST * samples as f64,
+            (Aggregate::Sum, Operator::AtLeast) => {
+                bound < -LARGEST * samples as f64 || least().is_some_and(|least| bound <= least * samples as f64)
+            }
+            (Aggregate::Min | Aggregate::Max | Aggregate::Mean | Aggregate::Percentile(_), Operator::AtMost) => {
+                bound > LARGEST
+            }
+            (Aggregate::Min | Aggregate::Max | Aggregate::Mean | Aggregate::Percentile(_), Operator::AtLeast) => {
+                bound < -LARGEST || least().is_some_and(|least| bound <= least)
+            }
+        }
     }
 
     /// Returns the left-hand side, which identifies the judged quantity.
@@ -428,6 +494,59 @@ mod tests {
         assert!(comparison.of(f64::NAN).is_nan());
         let below = Comparison { side: Side::Below, ..comparison };
         assert_eq!([2.9, 3.0, 3.1].map(|value| below.of(value)), [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_gate_that_no_sample_can_miss_is_told_from_one_that_samples_meet() {
+        let holds_always = |text: &str| text.parse::<Expression>().unwrap().holds_always(200);
+        for text in [
+            "count(ego_collided) >= 0",
+            "share(ego_collided) <= 1",
+            "share(ego_collided | rear_near) >= 0",
+            "upper(ego_collided) <= 1",
+            "lower(prevented | baseline.ego_collided) >= 0",
+            "coverage(closing-by-class) >= 0",
+            "max(max_jerk_mps3) <= 1e300",
+            "min(min_gap_rear_m) >= -1e300",
+            "mean(harm) >= 0",
+            "sum(harm) >= -1",
+            "p99(duration_s) >= 0",
+            "count(harm < -1) <= 0",
+            "share(baseline.impact_speed_mps < 0) <= 0.5",
+            "upper(min_ttc_rear_s < -1e9) <= 0.03",
+        ] {
+            assert!(holds_always(text), "{text}");
+        }
+        for text in [
+            "count(ego_collided) <= 200",
+            "count(ego_collided) >= 1",
+            "share(ego_collided) <= 0.999",
+            "lower(prevented | baseline.ego_collided) >= 0.001",
+            "coverage(closing-by-class) >= 0.01",
+            "max(max_jerk_mps3) <= 1000",
+            "min(min_gap_rear_m) >= 0",
+            "p99(min_ttc_rear_s) >= 0",
+            "mean(thw_gain_s) >= 0",
+            "sum(harm) <= 0.1",
+            "mean(harm) <= 0",
+            "count(harm > 0) <= 0",
+            "upper(imposed_braking_mps2 > 3) <= 0.05",
+        ] {
+            assert!(!holds_always(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_stricter_gate_bounds_the_same_value_on_the_same_side() {
+        let is_as_strict = |new: &str, old: &str| {
+            new.parse::<Expression>().unwrap().is_as_strict_as(&old.parse::<Expression>().unwrap())
+        };
+        assert!(is_as_strict("count(ego_collided) <= 0", "count(ego_collided) <= 3"));
+        assert!(is_as_strict("share(engaged) >= 0.5", "share(engaged) >= 0.5"));
+        assert!(!is_as_strict("count(ego_collided) <= 4", "count(ego_collided) <= 3"));
+        assert!(!is_as_strict("share(engaged) >= 0.4", "share(engaged) >= 0.5"));
+        assert!(!is_as_strict("share(engaged) <= 0.5", "share(engaged) >= 0.5"));
+        assert!(!is_as_strict("count(ego_collided | rear_near) <= 0", "count(ego_collided) <= 3"));
     }
 
     #[test]

@@ -53,6 +53,11 @@ impl Measure {
         REPORTED.contains(&self.name)
     }
 
+    /// Returns the smallest value that the measure can have; `None` of a measure without one.
+    pub fn least(&self) -> Option<f64> {
+        NOT_NEGATIVE.contains(&self.name).then_some(0.0)
+    }
+
     /// Returns the measures that rest on what happened, and not on what a controller reports.
     pub fn measured() -> impl Iterator<Item = &'static Self> {
         MEASURES.iter().filter(|measure| !measure.is_reported())
@@ -66,6 +71,14 @@ impl Measure {
 
 /// The measures that rest on the states that a controller reports.
 const REPORTED: [&str; 4] = ["engaged", "goal_in_reach", "thw_gain_s", "emergency_braked"];
+
+/// Amount that no measure of a run exceeds, in its unit (s, m, m/s, m/s², m/s³ or deaths): an
+/// assumption; 1e4 to 1e9 are plausible. A time to collision of two vehicles of the same speed may,
+/// and says nothing then.
+pub(super) const LARGEST: f64 = 1e6;
+
+/// The numbers that are 0 or more by definition.
+const NOT_NEGATIVE: [&str; 4] = ["impact_speed_mps", "delta_v_mps", "harm", "duration_s"];
 
 /// The flags of a pair of arms on the same sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

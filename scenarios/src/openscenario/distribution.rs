@@ -33,7 +33,7 @@ pub(super) struct ValueFile {
 /// Where the values of a file come from.
 #[derive(Clone, Debug)]
 pub(super) enum ValueSource {
-    /// The alternatives of each distribution, of which a combination has one.
+    /// The alternatives of each distribution. A combination has one of each.
     Deterministic(Vec<Vec<Given>>),
     /// Distributions, from which values are drawn.
     Stochastic(Stochastic),

@@ -103,7 +103,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     let side = if is_left_hand { "left" } else { "right" };
     let entry = entry_lane::find(lanes, side, length_m);
     if lanes.all("laneSection").count() > 1 && entry.is_none() {
-        notes.push("lanes that begin or end: the lanes are those of the first section".to_owned());
+        notes.push("lanes that begin or end: the first section gives the lanes".to_owned());
     }
     let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
     let mut driving: Vec<(i32, f64)> = Vec::new();

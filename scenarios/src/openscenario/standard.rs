@@ -232,7 +232,7 @@ const fn word(name: &'static str, standard: &'static [&'static str]) -> Attribut
     Attribute { name, kind: Kind::Word { standard, read: standard } }
 }
 
-/// An enumeration of which only a part is read.
+/// An enumeration that is read in part.
 const fn some(name: &'static str, standard: &'static [&'static str], read: &'static [&'static str]) -> Attribute {
     Attribute { name, kind: Kind::Word { standard, read } }
 }
@@ -293,6 +293,19 @@ const STORYBOARD_ELEMENT_TYPE: [&str; 6] = ["act", "action", "event", "maneuver"
 /// Largest steering angle of an axle. The standard allows 0 to π rad. Many files state degrees, and
 /// the import has no use for it.
 const MAX_STEERING: Attribute = at_least_0("maxSteering");
+
+/// The attributes of an axle.
+const AXLE: [Attribute; 5] =
+    [MAX_STEERING, number("positionX"), number("positionZ"), at_least_0("trackWidth"), at_least_0("wheelDiameter")];
+
+/// The limits of a vehicle, and of an action.
+const LIMITS: [Attribute; 5] = [
+    at_least_0("maxAcceleration"),
+    at_least_0("maxAccelerationRate"),
+    at_least_0("maxDeceleration"),
+    at_least_0("maxDecelerationRate"),
+    at_least_0("maxSpeed"),
+];
 
 /// The type `TransitionDynamics` of the standard.
 const TRANSITION_DYNAMICS: [Attribute; 4] = [
@@ -399,51 +412,11 @@ static ELEMENTS: [Element; 155] = [
     element("BoundingBox", &[], &["Center", "Dimensions"]),
     element("Center", &[number("x"), number("y"), number("z")], &[]),
     element("Dimensions", &[number("height"), number("length"), number("width")], &[]),
-    element(
-        "Performance",
-        &[
-            at_least_0("maxAcceleration"),
-            at_least_0("maxAccelerationRate"),
-            at_least_0("maxDeceleration"),
-            at_least_0("maxDecelerationRate"),
-            at_least_0("maxSpeed"),
-        ],
-        &[],
-    ),
+    element("Performance", &LIMITS, &[]),
     element("Axles", &[], &["FrontAxle", "RearAxle", "AdditionalAxle*"]),
-    element(
-        "FrontAxle",
-        &[
-            MAX_STEERING,
-            number("positionX"),
-            number("positionZ"),
-            at_least_0("trackWidth"),
-            at_least_0("wheelDiameter"),
-        ],
-        &[],
-    ),
-    element(
-        "RearAxle",
-        &[
-            MAX_STEERING,
-            number("positionX"),
-            number("positionZ"),
-            at_least_0("trackWidth"),
-            at_least_0("wheelDiameter"),
-        ],
-        &[],
-    ),
-    element(
-        "AdditionalAxle",
-        &[
-            MAX_STEERING,
-            number("positionX"),
-            number("positionZ"),
-            at_least_0("trackWidth"),
-            at_least_0("wheelDiameter"),
-        ],
-        &[],
-    ),
+    element("FrontAxle", &AXLE, &[]),
+    element("RearAxle", &AXLE, &[]),
+    element("AdditionalAxle", &AXLE, &[]),
     element("CatalogReference", &[text("catalogName"), text("entryName")], &["ParameterAssignments"]),
     element("ParameterAssignments", &[], &["ParameterAssignment*"]),
     element("ParameterAssignment", &[text("parameterRef"), text("value")], &[]),
@@ -549,17 +522,7 @@ static ELEMENTS: [Element; 155] = [
         ],
         &["DynamicConstraints"],
     ),
-    element(
-        "DynamicConstraints",
-        &[
-            at_least_0("maxAcceleration"),
-            at_least_0("maxAccelerationRate"),
-            at_least_0("maxDeceleration"),
-            at_least_0("maxDecelerationRate"),
-            at_least_0("maxSpeed"),
-        ],
-        &[],
-    ),
+    element("DynamicConstraints", &LIMITS, &[]),
     element("LateralAction", &[], &["LaneChangeAction", "LaneOffsetAction", "LateralDistanceAction"]),
     element("LaneChangeAction", &[number("targetLaneOffset")], &["LaneChangeActionDynamics", "LaneChangeTarget"]),
     element("LaneChangeActionDynamics", &TRANSITION_DYNAMICS, &[]),

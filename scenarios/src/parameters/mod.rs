@@ -21,7 +21,6 @@ mod copula;
 mod copula_tests;
 mod distribution;
 mod finite;
-mod normal_point;
 mod space;
 mod strata;
 #[cfg(test)]
@@ -32,7 +31,6 @@ pub use config::{
     TruncatedNormalConfig, UniformConfig,
 };
 pub use distribution::Distribution;
-pub use normal_point::NormalPoint;
 pub(crate) use strata::{Part, Strata, volume};
 
-pub use space::{ParameterSpace, Provenance, SpaceEntry, Variation};
+pub use space::{NormalPoint, ParameterSpace, Provenance, SpaceEntry, Variation};

@@ -8,7 +8,7 @@ use closecall_traffic::{ParameterName, Parameters};
 use super::random;
 use crate::parameters::ParameterSpace;
 
-/// Returns the parameter values of sample `index`. Without bins it is that of the random design.
+/// Returns the parameter values of sample `index`. Without bins the random design gives it.
 pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameters {
     let parts = space.strata().of_sample(index);
     let number = |(parameter, (name, _)): (usize, (&ParameterName, _))| {

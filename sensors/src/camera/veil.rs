@@ -11,7 +11,7 @@
 //! ```
 //!
 //! k is 1 for a healthy young eye. It is an assumption that a camera behind a window scatters light
-//! in the same way. The falloff is that of polished surfaces: their scatter falls with about the
+//! in the same way. The falloff is as for polished surfaces: their scatter falls with about the
 //! 1.8th power of the angle (the default of the ABg model of Photon Engineering's FRED). Within 1°
 //! the radiance keeps its value at 1°. Beyond 30° it continues to fall, to zero where the source is
 //! behind the lens. The veil is added before the exposure: pixels near the source saturate, and all

@@ -31,7 +31,7 @@ pub enum Content {
 pub struct CameraLooks {
     /// The lens.
     pub optics: Optics,
-    /// Time from the reading of the first row of an image to that of the last (s).
+    /// Time from the reading of the first row of an image to the reading of the last (s).
     pub readout_s: f64,
     /// Brightness of the night sky, relative to the sky over a town (0 to 1).
     pub night_sky: f64,

@@ -1,6 +1,7 @@
 //! What a program is told of a LiDAR and of a rear radar.
 
 use closecall_traffic::Side;
+use serde::{Deserialize, Serialize};
 
 use crate::lidar::Lidar;
 
@@ -49,7 +50,7 @@ impl LidarMount {
 }
 
 /// A rear radar as a program is told of it, in the frame of the ego.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RadarMount {
     /// Side of the ego on which the radar is.
     pub side: Side,

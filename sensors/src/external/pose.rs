@@ -3,9 +3,10 @@
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{Road, VehicleState, maths};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use serde::{Deserialize, Serialize};
 
 /// The place of the ego in the frame of its first pose, as its odometry and its map give it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Position along the first heading (m).
     pub x_m: f64,

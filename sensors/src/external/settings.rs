@@ -42,16 +42,16 @@ impl ProgramKind {
     }
 }
 
-/// Default time limit of each answer (ms), that of a controller.
+/// Default time limit of each answer (ms), as for a controller.
 pub const DEFAULT_PROGRAM_TIMEOUT_MS: u64 = 1_000;
 
-/// Default limit of the memory of a program (MiB), that of a controller.
+/// Default limit of the memory of a program (MiB), as for a controller.
 pub const DEFAULT_PROGRAM_MEMORY_MIB: u64 = 1_024;
 
-/// Largest time limit (ms), that of a controller.
+/// Largest time limit (ms), as for a controller.
 const MAX_TIMEOUT_MS: u64 = 600_000;
 
-/// Largest limit of memory (MiB), that of a controller.
+/// Largest limit of memory (MiB), as for a controller.
 const MAX_MEMORY_MIB: u64 = 1_048_576;
 
 /// Default distance of the columns and rows of an image that a program gets (px).

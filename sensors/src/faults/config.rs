@@ -14,7 +14,8 @@ use super::object::ObjectFaultConfig;
 use super::radar::RadarFaultConfig;
 use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 use crate::camera::CameraFault;
-use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
+use crate::kept::kept;
+use crate::lidar::MAX_HALF_FIELD_DEG;
 
 /// Longest additional latency (s).
 pub(super) const MAX_DELAY_S: f64 = 0.4;
@@ -241,33 +242,12 @@ impl LidarFaultConfig {
             crosstalk: number(&self.crosstalk, "crosstalk", Range::closed(0.0, 50.0))?,
             blooming_deg: number(&self.blooming_deg, "blooming-deg", Range::closed(0.0, 5.0))?,
         };
-        let has_effect = fault != LidarFault::default() || self.has_numbers();
-        if !has_effect {
+        let Self { from_s, until_s, sensor, .. } = self.clone();
+        if *self == (Self { from_s, until_s, sensor, ..Self::default() }) {
             return Err(without_effect());
         }
-        let fault = LidarFault { sensor: self.sensor.as_deref().map(intern_name), ..fault };
+        let fault = LidarFault { sensor: self.sensor.as_deref().map(kept), ..fault };
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
-    }
-
-    /// Returns whether the entry names an effect by a number, which may be zero.
-    fn has_numbers(&self) -> bool {
-        [
-            &self.lost_frames,
-            &self.dropout,
-            &self.window_transmission,
-            &self.delay_s,
-            &self.jitter_s,
-            &self.clock_offset_s,
-            &self.yaw_deg,
-            &self.pitch_deg,
-            &self.height_m,
-            &self.range_noise_m,
-            &self.rail_ghosts,
-            &self.crosstalk,
-            &self.blooming_deg,
-        ]
-        .into_iter()
-        .any(Option::is_some)
     }
 }
 
@@ -318,8 +298,8 @@ impl CameraFaultConfig {
             dirt: number(&self.dirt, "dirt", SHARE)?,
             blur_px: number(&self.blur_px, "blur-px", Range::closed(0.0, 50.0))?,
         };
-        let named = [&self.sun_glare, &self.main_beam_glare, &self.dirt, &self.blur_px];
-        if fault == CameraFault::default() && named.into_iter().all(Option::is_none) {
+        let Self { from_s, until_s, .. } = self.clone();
+        if *self == (Self { from_s, until_s, ..Self::default() }) {
             return Err(without_effect());
         }
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))

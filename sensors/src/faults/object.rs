@@ -193,27 +193,10 @@ impl ObjectFaultConfig {
             speed_noise_mps: number(&self.speed_noise_mps, "speed-noise-mps", NOISE_MPS)?,
             ghost: check_ghost([&self.ghost_gap_m, &self.ghost_closing_mps], parameters)?,
         };
-        if fault == ObjectFault::default() && !self.has_numbers() {
+        let Self { from_s, until_s, .. } = self.clone();
+        if *self == (Self { from_s, until_s, ..Self::default() }) {
             return Err(without_effect());
         }
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
-    }
-
-    /// Returns whether the entry names an effect by a number, which may be zero.
-    fn has_numbers(&self) -> bool {
-        [
-            &self.lost_frames,
-            &self.dropout,
-            &self.range_share,
-            &self.delay_s,
-            &self.jitter_s,
-            &self.clock_offset_s,
-            &self.yaw_deg,
-            &self.range_noise_m,
-            &self.lateral_noise_m,
-            &self.speed_noise_mps,
-        ]
-        .into_iter()
-        .any(Option::is_some)
     }
 }

@@ -155,9 +155,8 @@ impl RadarFaultConfig {
             yaw_rad: parameters.number_or(self.yaw_deg.as_ref(), "yaw-deg", ANGLE_DEG, 0.0)?.to_radians(),
             ghost: check_ghost([&self.ghost_gap_m, &self.ghost_closing_mps], parameters)?,
         };
-        let has_numbers =
-            [&self.dropout, &self.range_share, &self.delay_s, &self.yaw_deg].into_iter().any(Option::is_some);
-        if fault == RadarFault::default() && !has_numbers {
+        let Self { from_s, until_s, side, .. } = self.clone();
+        if *self == (Self { from_s, until_s, side, ..Self::default() }) {
             return Err(without_effect());
         }
         Ok((RadarFault { side: self.side, ..fault }, check_span([&self.from_s, &self.until_s], parameters)?))

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Each beam becomes a column of one layer, in the order of the azimuths; beams of the same azimuth
-//! keep the order of the table. The whole scan then works as that of a raster does, except for the
+//! keep the order of the table. The whole scan then works as a raster does, except for the
 //! time: neighbouring columns are measured at any times. A vehicle is therefore cast at the mean
 //! time of the beams near its azimuth, and the range of each beam follows from the motion of the
 //! face that the beam hits ([`FaceDrift`](super::targets::FaceDrift)).

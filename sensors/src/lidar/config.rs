@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::kind::NOMINAL_RANGE_M;
 use super::material::{DIRTY_PLATE, PLATE};
-use super::names::intern_name;
 use super::{ClusteringCheck, ClusteringModel, LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
+use crate::kept::kept;
 
 /// The state of the registration plates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -279,7 +279,7 @@ impl LidarConfig {
     /// Returns the name of the sensor.
     fn checked_name(&self, default_name: Option<&'static str>) -> Result<&'static str, ConfigError> {
         match (&self.name, default_name) {
-            (Some(name), _) if ActorId::new(name).is_ok() => Ok(intern_name(name)),
+            (Some(name), _) if ActorId::new(name).is_ok() => Ok(kept(name)),
             (Some(name), _) => {
                 let rule =
                     format!("`{name}` is no name: it needs lower-case letters, digits and hyphens, a letter first");

@@ -252,7 +252,11 @@ mod tests {
         Face { inverse: [0.0; 3], offset_m: 1.0, strength_m, material: Material::Paint, source: PointSource::Actor(0) }
     }
 
-    fn echoes(ranges_m: [Option<f32>; SUBRAYS]) -> Vec<(f32, f32)> {
+    const LEVEL: Elevation =
+        Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
+
+    /// Returns hits of a face at these ranges.
+    fn hits_at(ranges_m: [Option<f32>; SUBRAYS]) -> BeamHits {
         let mut hits = BeamHits::NONE;
         for (subray, range_m) in ranges_m.into_iter().enumerate() {
             if let Some(range_m) = range_m {
@@ -260,11 +264,15 @@ mod tests {
                 hits.face[subray] = 0;
             }
         }
-        let level = Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
+        hits
+    }
+
+    fn echoes(ranges_m: [Option<f32>; SUBRAYS]) -> Vec<(f32, f32)> {
+        let hits = hits_at(ranges_m);
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         // At 10 m each sub-ray contributes 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
         let mut echoes = Echoes::NONE;
-        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => echoes.set(simd, (&hits, &level), &[face(10.0)], &link));
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => echoes.set(simd, (&hits, &LEVEL), &[face(10.0)], &link));
         let unit = link.gain_m2 / 100.0;
         echoes.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
     }
@@ -285,15 +293,7 @@ mod tests {
     /// Returns the variances of the range within the echoes of sub-rays that hit a face at these
     /// ranges (m²).
     fn variances_m2_of(ranges_m: [Option<f32>; SUBRAYS]) -> [f32; SUBRAYS] {
-        let mut hits = BeamHits::NONE;
-        for (subray, range_m) in ranges_m.into_iter().enumerate() {
-            if let Some(range_m) = range_m {
-                hits.inverse[subray] = 1.0 / range_m;
-                hits.face[subray] = 0;
-            }
-        }
-        let level = Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
-        range_variances_m2((&hits, &level), &[face(10.0)])
+        range_variances_m2((&hits_at(ranges_m), &LEVEL), &[face(10.0)])
     }
 
     #[test]

@@ -1,12 +1,14 @@
 //! The scanner's output: a scan, and separately the ground truth of each of its points.
 
 use closecall_traffic::Time;
+use serde::{Deserialize, Serialize};
 
 use super::Material;
 use super::kind::Resolution;
 
 /// The side of the two-sided mirror that deflects the beams of a scan.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum MirrorSide {
     /// The side that raises the layers: + in the pattern's formula.
     #[default]

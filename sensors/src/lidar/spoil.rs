@@ -112,7 +112,7 @@ impl Spoiler<'_> {
         f64::from(self.noise.uniform((index % 2) * self.pattern.kind().beams() + usize::from(beam), purpose))
     }
 
-    /// Returns the echo pulse width (ns) and the reported intensity of an added point: those of the
+    /// Returns the echo pulse width (ns) and the reported intensity of an added point: as for the
     /// surface whose intensity it has, behind the same window.
     fn echo(&self, point: &Added) -> [f32; 2] {
         let square_m2: f32 = point.at_m.iter().zip(self.sensor_m()).map(|(at, sensor)| (at - sensor).powi(2)).sum();

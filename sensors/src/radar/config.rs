@@ -109,7 +109,7 @@ pub struct RearRadar {
 }
 
 impl RearRadar {
-    /// Returns whether a scan ends at the control step of `time`, as that of a LiDAR does.
+    /// Returns whether a scan ends at the control step of `time`, as a scan of a LiDAR does.
     pub(super) fn is_due(&self, time: Time) -> bool {
         let periods_at = |time_ns: i64| time_ns.div_euclid(self.period_ns);
         periods_at(time.ns()) != periods_at(time.ns() - CONTROL_STEP.ns())

@@ -1,13 +1,12 @@
 //! What a radar would measure without errors: directly, and by way of a guard rail.
 //!
 //! ```text
-//!        ▪ image      distance and angle of the image: those of the path by way of the rail
+//!        ▪ image      distance and angle of the image: along the path by way of the rail
 //!   ═════╪═══════════ guard rail
 //!        ▫ vehicle            ◁ radar
 //! ```
 //!
-//! On a curve, the image is that of a mirror along the road: its distance from the rail is that of
-//! the vehicle.
+//! On a curve, the rail mirrors along the road: image and vehicle are equally far from the rail.
 
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{Road, maths};

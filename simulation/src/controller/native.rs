@@ -139,7 +139,7 @@ impl NativeSettings {
             let reason = format!("it is not loaded within {} s: its constructor may wait or loop", limit.as_secs_f64());
             return Err(NativeError::Crash { controller, reason });
         };
-        child.finish().map_err(crash)?;
+        child.finish_unloading().map_err(crash)?;
         match serde_json::from_slice(&line) {
             Ok(Probe::Identity(identity)) => Ok(identity),
             Ok(Probe::Refused { reason, is_io }) => Err(NativeError::Refused { controller, reason, is_io }),

@@ -12,11 +12,11 @@ use crate::controller::exec::{ExecError, excerpt};
 
 /// Largest number of detections or tracks in an answer. An assumption: a motorway has some tens of vehicles in view.
 pub(super) const MOST_OBJECTS: usize = 256;
-/// Largest coordinate (m): that of the LiDARs' region of interest.
+/// Largest coordinate (m), as in the LiDARs' region of interest.
 const POSITION: Range = Range::closed(-500.0, 500.0);
-/// Largest speed (m/s). An assumption: twice that of the fastest vehicle of a motorway.
+/// Largest speed (m/s). An assumption: twice as fast as the fastest vehicle of a motorway.
 const SPEED: Range = Range::closed(-150.0, 150.0);
-/// Lengths of vehicles (m): up to that of the European modular system, with a margin for errors.
+/// Lengths of vehicles (m): up to the European modular system, with a margin for errors.
 const LENGTH: Range = Range::closed(0.1, 40.0);
 /// Widths of vehicles (m).
 const WIDTH: Range = Range::closed(0.1, 5.0);
@@ -28,7 +28,7 @@ const ASYMMETRY: f64 = 1e-9;
 const SUM_TOLERANCE: f64 = 1e-3;
 /// Longest time by which a detection may be older than its scan (ns).
 const OLDEST_NS: i64 = 200_000_000;
-/// Height of the highest point of a detection that states none (m): that of a car.
+/// Height of the highest point of a detection that states none (m): the height of a car.
 pub(super) const USUAL_TOP_M: f64 = 1.5;
 
 /// The key under which the process of a library or of an object says why it has no answer.
@@ -66,7 +66,7 @@ pub(super) enum AnswerError {
 }
 
 impl AnswerError {
-    /// Returns the message about a library or an object. Its line is that of the process around it.
+    /// Returns the message about a library or an object. Its line comes from the process around it.
     pub(super) fn without_line(&self, who: &str) -> String {
         match self {
             // A number that is not finite is written as a word.
@@ -303,7 +303,7 @@ fn detection(object: &Object, time: Time) -> Result<Detection, Wrong> {
 fn track(object: &Object, time: Time, ids: &mut BTreeSet<u32>) -> Result<Track, Wrong> {
     let id = object.whole("id", 0)?;
     if !ids.insert(id) {
-        return Err(object.wrong("id", "another number than that of every other track of the answer"));
+        return Err(object.wrong("id", "a number that no other track of the answer has"));
     }
     let status = match object.object.get("status").and_then(Value::as_str) {
         Some("tentative") => TrackStatus::Tentative,

@@ -7,7 +7,7 @@
 //!            ◀── last lines, for error messages ─────────────── standard error  ┘
 //! ```
 //!
-//! The process is a child as that of a controller ([`exec`](crate::controller::exec)), with the same framing, limits and errors:
+//! The process is a child, as a controller is ([`exec`](crate::controller::exec)), with the same framing, limits and errors:
 //! one line of JSON per message, at most 1 MiB long in an answer. The arrays of a scan are base64 of little-endian numbers, so that a
 //! point costs 30 bytes instead of some 60 as JSON numbers, and NumPy reads an array in one call. Each answer must repeat the `time_ns` of
 //! its question.
@@ -20,13 +20,15 @@
 //! 3. At each control step in which a scan of some LiDAR is due, Closecall sends `{"type":"scans","time_s":…,"time_ns":…,"odometry":{…},
 //!    "pose":{…},"scans":[…],"radar_scans":[…]}`. A run without rear radars has neither `radars` nor `radar_scans`.
 //! 4. The process answers `{"time_ns":…,"detections":[…]}` or `{"time_ns":…,"tracks":[…]}`, as it has announced.
-//! 5. At the end of the run Closecall closes the standard input, and reads what is left, which must be nothing.
+//! 5. At the end of the run Closecall closes the standard input, and reads what is left, which must be nothing. The process ends, or
+//!    is killed half a second later. A crash is an error.
 //!
 //! `docs/reference/perception.md` has every key.
 
 mod answer;
 pub mod hosted;
 mod library;
+mod message;
 mod process;
 mod question;
 

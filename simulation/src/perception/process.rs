@@ -114,7 +114,11 @@ impl PerceptionProgram for PerceptionProcess {
     }
 
     fn finish(&mut self, time: Time) -> Result<(), SensorError> {
-        let finished = self.started.as_mut().map_or(Ok(()), |(child, _)| child.finish());
+        let Some((child, _)) = &mut self.started else { return Ok(()) };
+        // The process of a library first frees the perception.
+        let is_library = self.program.kind == ProgramKind::Lib;
+        let limit = Duration::from_millis(self.program.timeout_ms);
+        let finished = if is_library { child.finish_run(limit) } else { child.finish() };
         finished.map_err(|error| self.failure(&error.into(), time))
     }
 }
@@ -153,7 +157,7 @@ pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
         let waited_s = limit.as_secs_f64();
         return Err(fail(format!("it is not loaded within {waited_s} s: its constructor may wait or loop")));
     };
-    child.finish().map_err(crash)?;
+    child.finish_unloading().map_err(crash)?;
     match serde_json::from_slice(&line) {
         Ok(Probe::Identity(_)) => Ok(()),
         Ok(Probe::Refused { reason, is_io }) => {

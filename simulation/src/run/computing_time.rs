@@ -41,7 +41,7 @@ impl ComputingTime {
     /// Calls `step`, and adds the time that it takes.
     ///
     /// # Errors
-    /// The error of `step`, or [`ControllerError::Late`] if the mean computing time, or that of too
+    /// The error of `step`, or [`ControllerError::Late`] if the mean computing time, or the time of too
     /// many steps, exceeds the control period.
     pub(super) fn of<T>(
         &mut self,

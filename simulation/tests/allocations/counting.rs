@@ -1,7 +1,7 @@
 //! An allocator that counts the allocations of each thread.
 #![expect(
     unsafe_code,
-    reason = "the interface of an allocator is unsafe; this one passes every call on to that of the system"
+    reason = "the interface of an allocator is unsafe; this one passes every call on to the allocator of the system"
 )]
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -2,7 +2,7 @@
 //!
 //! The logarithm of the ratio n₁/n₀ of two paired counts has the variance (b + c)/(n₀·n₁), where b samples have the outcome only
 //! without the system, and c only with it. It follows from the delta method for a multinomial distribution, and is 0 if both arms
-//! agree in every sample. If the outcome never happens with the system, the ratio is 0, and its upper bound is that of the share of
+//! agree in every sample. If the outcome never happens with the system, the ratio is 0, and its upper bound is the bound of the share of
 //! the n₀ samples that keep the outcome (Clopper-Pearson).
 
 use closecall_scenarios::outcome::Outcome;

@@ -130,7 +130,7 @@ impl Anchor {
         self.members.iter().filter(agrees).map(|row| row.name.as_str())
     }
 
-    /// Returns the variation that moves the ratio furthest from that of the scenario's own drivers, by its logarithm, with both
+    /// Returns the variation that moves the ratio furthest from the ratio of the scenario's own drivers, by its logarithm, with both
     /// ratios; `None` if too few collide.
     pub fn mover(&self, quantity: Quantity) -> Option<(&Row, [f64; 2])> {
         let own = self.members.first()?;

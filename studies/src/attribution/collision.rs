@@ -2,19 +2,40 @@
 
 use std::sync::Arc;
 
-use closecall_controllers::EgoState;
+use closecall_controllers::{EgoController, EgoSettings, EgoState, R157Driver};
 use closecall_scenarios::outcome::{ClosedBy, Collision, Moment, Outcome, Phase};
 use closecall_scenarios::{Scenario, Setting};
 use closecall_sensors::SensorMode;
-use closecall_simulation::{Arm, NoObserver};
+use closecall_simulation::{Arm, ControllerFactory, NoObserver};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{ActorId, GRAVITY_MPS2, PHYSICS_STEP};
 use serde::{Deserialize, Serialize};
 
 use super::Trace;
-use super::careful_ego::CarefulEgo;
 use super::counterfactual::{Braking, Pair};
 use crate::case::{Case, CausesError, fails};
+
+/// The competent and careful driver of UN Regulation 157 in the place of the ego: it starts where the ego starts, and
+/// follows with its gap.
+struct CarefulEgo;
+
+impl ControllerFactory for CarefulEgo {
+    fn name(&self) -> &str {
+        "r157-driver-in-place-of-ego"
+    }
+
+    fn settings(&self, settings: &EgoSettings) -> EgoSettings {
+        R157Driver::settings(*settings).with_time_gap(settings.time_gap_s())
+    }
+
+    fn has_mis(&self, _: &EgoSettings) -> bool {
+        false
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        Box::new(R157Driver::new(self.settings(settings)))
+    }
+}
 
 /// A vehicle of a collision.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -14,7 +14,6 @@
 //! the other drivers react to the other ego. In a rear-end collision, the braking of the striking
 //! vehicle decides. About other contacts, the counterfactuals of the striking vehicle say nothing.
 
-mod careful_ego;
 mod collision;
 mod counterfactual;
 mod trace;

@@ -59,7 +59,7 @@ impl Stage {
             Self::Points => "exact points of the rear LiDAR",
             Self::Clusters => "true clusters and boxes",
             Self::Class => "the true class of every vehicle behind the ego",
-            Self::Tracks => "true tracks, as late as those of the sensors",
+            Self::Tracks => "true tracks, as late as the sensors' tracks",
             Self::Timing => "sensors and trackers that need no time",
             Self::Actuation => "actuators of the ego that follow at once",
             Self::RearReaction => "a rear driver who reacts at once",

@@ -30,5 +30,6 @@ mod write;
 pub use nearest::{NearestFailure, NearestSearch};
 pub use run::{Minimized, Offset, minimize, minimize_sample};
 pub use text::MinimizedText;
+pub use trial::WithoutOutcome;
 pub use twin::Twin;
 pub use write::{MinimizedFiles, output_files, write_files};

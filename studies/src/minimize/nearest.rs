@@ -4,13 +4,13 @@
 //!  failing samples ─▶ nearest first ─▶ nominal labels, first failing point of the ray ─▶ nearest three ─▶ design point
 //! ```
 //!
-//! Distances are those of standard normal space, in which the parameters of the scenario are
+//! Distances are in standard normal space, in which the parameters of the scenario are
 //! independent, whatever their distributions and rank correlations are (for a Gaussian copula this
 //! is the transformation of A. Nataf; P.-L. Liu and A. Der Kiureghian, *Multivariate distribution
 //! models with prescribed marginals and covariances*, Probabilistic Engineering Mechanics 1 (1986)
 //! 105–112). Of all failing cases, the nearest one has the largest probability density there.
 //!
-//! The random streams of drivers and sensors have no distance. Each search keeps those of the sample
+//! The random streams of drivers and sensors have no distance. Each search keeps the streams of the sample
 //! from which it starts. A label that fails as well at its nominal value is set to it first; the
 //! search then moves the numbers only.
 
@@ -24,7 +24,7 @@ use serde::Serialize;
 
 use super::design_point::{Cases, DesignPoint};
 use super::run::{Minimized, described, with_choice};
-use super::trial::Trial;
+use super::trial::{Trial, WithoutOutcome};
 use crate::case::{Case, CausesError, fails};
 use crate::failures::passes;
 
@@ -142,6 +142,7 @@ impl NearestSearch {
         let starts = self.starts();
         let mut found: Vec<Found<'_>> = Vec::new();
         let (mut tried, mut runs) = (0, 0);
+        let mut without_outcome: Option<WithoutOutcome> = None;
         for Start { case, point } in &starts {
             if !found.is_empty() && runs >= most_runs / 2 {
                 break;
@@ -150,8 +151,9 @@ impl NearestSearch {
             let first = drawn_in(&trial, point.clone());
             tried += 1;
             runs += trial.runs();
-            if let Some((point, has_converged)) = first {
-                found.push(Found { trial, point, has_converged });
+            match first {
+                Some((point, has_converged)) => found.push(Found { trial, point, has_converged }),
+                None => without_outcome = WithoutOutcome::joined(without_outcome, trial.without_outcome()),
             }
             if found.last().is_some_and(|found| found.length_sd() == 0.0) {
                 break;
@@ -167,7 +169,13 @@ impl NearestSearch {
             }
         }
         let Some(nearest) = found.iter().min_by(|a, b| a.length_sd().total_cmp(&b.length_sd())) else {
-            return Err(passes(saved, &self.case));
+            return Err(match without_outcome {
+                Some(WithoutOutcome { message, .. }) => {
+                    let controller = self.case.arm.controller.name().to_owned();
+                    CausesError::NoOutcome { scenario: self.case.file.config().name.clone(), controller, message }
+                }
+                None => passes(saved, &self.case),
+            });
         };
         let details = NearestFailure {
             runs,
@@ -181,7 +189,9 @@ impl NearestSearch {
         let names: Vec<ParameterName> = values.iter().map(|(name, _)| name).filter(is_off).cloned().collect();
         let described = described(trial, &values, &names, &[])?;
         let distance_sd = Some(nearest.length_sd());
-        Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, ..described }))
+        let of_found = found.iter().map(|one| one.trial.without_outcome());
+        let without_outcome = of_found.fold(without_outcome, WithoutOutcome::joined);
+        Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, without_outcome, ..described }))
     }
 
     /// Returns the failing samples that are nearest to the nominal case, the nearest first. A sample
@@ -249,7 +259,7 @@ impl Found<'_> {
     }
 }
 
-/// Returns the random numbers of a search. They differ from those of the sample.
+/// Returns the random numbers of a search. They differ from the sample's numbers.
 fn random_numbers(case: &Case) -> Stream {
     #[expect(clippy::expect_used, reason = "a constant, and every test draws from it")]
     let owner = ActorId::new(OWNER).expect("a legal name");

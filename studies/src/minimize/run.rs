@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::nearest::NearestFailure;
 use super::subset::fewest;
-use super::trial::Trial;
+use super::trial::{Trial, WithoutOutcome};
 use super::twin::{Candidate, Twin, twin};
 use super::{grid, words};
 use crate::attribution::{Attribution, attribute};
@@ -80,6 +80,9 @@ pub struct Minimized {
     /// The search for the case, if it is the one nearest to the nominal case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest: Option<NearestFailure>,
+    /// Runs of the search that had no outcome: a smaller or nearer case may be among them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without_outcome: Option<WithoutOutcome>,
 }
 
 impl Minimized {
@@ -114,7 +117,7 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
     Ok(Some(Minimized { why_more_than_three, ..minimized }))
 }
 
-/// Describes a case that fails with these values, of which the named ones are off nominal.
+/// Describes a case that fails with these values. The named ones are off nominal.
 pub(super) fn described(
     trial: &Trial<'_>,
     values: &Parameters,
@@ -146,6 +149,8 @@ pub(super) fn described(
         collision,
         sentence,
         nearest: None,
+        // The twin is the last one that is searched.
+        without_outcome: trial.without_outcome(),
     })
 }
 

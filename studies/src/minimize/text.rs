@@ -7,7 +7,7 @@ use closecall_campaign::action::CommandFor;
 use closecall_traffic::readable;
 use closecall_traffic::words::counted;
 
-use super::{Minimized, MinimizedFiles, NearestFailure};
+use super::{Minimized, MinimizedFiles, NearestFailure, WithoutOutcome};
 
 /// A minimized case as text for readers.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +29,11 @@ impl fmt::Display for MinimizedText<'_> {
         }
         if let Some(why) = &minimized.why_more_than_three {
             writeln!(f, "  {why}")?;
+        }
+        if let Some(WithoutOutcome { runs, message }) = &minimized.without_outcome {
+            let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
+            let runs = counted(*runs, "run");
+            writeln!(f, "  {runs} of the search ended in an ERROR and count as not failing, such as: {message}")?;
         }
         writeln!(f, "{}", minimized.sentence)?;
         if let Some(reference) = &minimized.reference {

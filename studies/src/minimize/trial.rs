@@ -7,11 +7,33 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use closecall_campaign::runner::run_guarded;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, Setting, SettingError};
-use closecall_simulation::{Arm, NoObserver};
+use closecall_simulation::{Arm, NoObserver, SampleError};
 use closecall_traffic::{ParameterName, Parameters, Value};
+use serde::Serialize;
 
 use super::grid;
 use crate::case::{Case, fails};
+
+/// Runs of a search that had no outcome. The search takes them for runs that do not fail.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct WithoutOutcome {
+    /// Number of runs.
+    pub runs: u64,
+    /// The message that is first in the order of the alphabet, whichever run ended first.
+    pub message: String,
+}
+
+impl WithoutOutcome {
+    /// Returns the runs of two searches together.
+    pub(super) fn joined(one: Option<Self>, other: Option<Self>) -> Option<Self> {
+        match (one, other) {
+            (Some(one), Some(other)) => {
+                Some(Self { runs: one.runs + other.runs, message: one.message.min(other.message) })
+            }
+            (one, other) => one.or(other),
+        }
+    }
+}
 
 /// A sample whose parameters can be moved to their nominal values.
 pub(super) struct Trial<'a> {
@@ -29,6 +51,8 @@ pub(super) struct Trial<'a> {
     results: Mutex<BTreeMap<String, bool>>,
     /// Number of runs so far.
     runs: AtomicU64,
+    /// The runs without an outcome so far.
+    without_outcome: Mutex<Option<WithoutOutcome>>,
 }
 
 impl<'a> Trial<'a> {
@@ -37,8 +61,8 @@ impl<'a> Trial<'a> {
         let (sampled, nominal) = (case.sampled(), case.file.space().nominal());
         let differing = sampled.iter().filter(|(name, value)| nominal.get(name) != Some(value));
         let differing = differing.map(|(name, _)| name.clone()).collect();
-        let (results, runs) = (Mutex::default(), AtomicU64::default());
-        let trial = Self { case, sampled, nominal, differing, is_robust: true, results, runs };
+        let (results, runs, without_outcome) = (Mutex::default(), AtomicU64::default(), Mutex::default());
+        let trial = Self { case, sampled, nominal, differing, is_robust: true, results, runs, without_outcome };
         let is_robust = trial.fails(&trial.sampled);
         Self { is_robust, results: Mutex::default(), ..trial }
     }
@@ -46,6 +70,19 @@ impl<'a> Trial<'a> {
     /// Returns the number of runs so far, the runs at half the time step among them.
     pub(super) fn runs(&self) -> u64 {
         self.runs.load(Ordering::Relaxed)
+    }
+
+    /// Returns the runs without an outcome so far; `None` if there are none.
+    pub(super) fn without_outcome(&self) -> Option<WithoutOutcome> {
+        self.without_outcome.lock().ok().and_then(|without| without.clone())
+    }
+
+    /// Counts a run without an outcome.
+    fn note(&self, error: &SampleError) {
+        if let Ok(mut without) = self.without_outcome.lock() {
+            let more = WithoutOutcome { runs: 1, message: error.to_string() };
+            *without = WithoutOutcome::joined(without.take(), Some(more));
+        }
     }
 
     /// Returns the nominal values with the named parameters at the values of the sample.
@@ -95,7 +132,13 @@ impl<'a> Trial<'a> {
             self.runs.fetch_add(1, Ordering::Relaxed);
             run_guarded(scenario, self.case.key(), arm, &mut NoObserver)
         };
-        let has = |scenario: &Scenario| run(scenario).is_ok_and(|outcome| holds(&outcome));
+        let has = |scenario: &Scenario| match run(scenario) {
+            Ok(outcome) => holds(&outcome),
+            Err(error) => {
+                self.note(&error);
+                false
+            }
+        };
         has(scenario) && (!self.is_robust || has(&scenario.at_half_step()))
     }
 

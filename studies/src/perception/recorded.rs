@@ -7,7 +7,7 @@
 //!  labels ─────────────┴────────────────────────────────────────▶ truth ─▶ detection, errors, consistency
 //! ```
 //!
-//! The figures with labels are those of the study of simulated sensors. A labelled vehicle takes the
+//! The figures with labels are as in the study of simulated sensors. A labelled vehicle takes the
 //! place of an approach.
 
 use closecall_recorded::scans::{Labels, Poses, Recording, ScanFileError, ScanFileProblem, TakenScan};
@@ -97,7 +97,7 @@ pub struct RecordedStudy {
 pub struct TruthFigures {
     /// Time in which tracks were compared with labels (s).
     pub judged_s: f64,
-    /// The figures of all labelled vehicles behind, and of those of each class.
+    /// The figures of all labelled vehicles behind, and of the vehicles of each class.
     pub groups: Vec<VehicleGroup>,
     /// Mean normalised squared error of the confirmed tracks, 4 if their covariance is right; `None`
     /// without one.

@@ -3,7 +3,7 @@
 CriMe is the CommonRoad criticality toolbox (Y. Lin, M. Althoff, "CommonRoad-CriMe: A toolbox for criticality
 measures of autonomous vehicles", IV 2023; package `commonroad-crime`). The formulas below are the ones of its
 version 0.4.5 (`measure/distance/hw.py`, `measure/time/thw.py`, `measure/time/ttc.py`) for a road along the x axis.
-Its dependencies exclude those of the other checkers: commonroad-io 2024.3 needs protobuf 3.20.2, and betterosi needs
+Its dependencies exclude the dependencies of the other checkers: commonroad-io 2024.3 needs protobuf 3.20.2, and betterosi needs
 6.30 or later. Where the package is installed, its own values are printed beside the formulas, without its rounding to
 0.01 s.
 

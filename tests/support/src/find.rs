@@ -71,7 +71,7 @@ pub fn python_with_rerun() -> Option<PathBuf> {
     found(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
 }
 
-/// Returns a Python interpreter that has these packages, separated by commas: that of the environment in which the Rerun viewer lies.
+/// Returns a Python interpreter that has these packages, separated by commas: the interpreter of the environment in which the Rerun viewer lies.
 ///
 /// # Panics
 /// As [`skip`].

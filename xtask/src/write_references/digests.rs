@@ -6,11 +6,12 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::source::expand;
 use closecall_scenarios::{Function, Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
@@ -22,8 +23,6 @@ use serde::{Deserialize, Serialize};
 pub(crate) const DIGESTS: &str = "docs/evidence/determinism.json";
 /// The folder of the scenarios.
 const LIBRARY: &str = "scenarios/library";
-/// Its folders of files that scenarios read.
-const NO_SCENARIOS: [&str; 2] = ["fitted", "fleets"];
 /// Seed of all samples.
 pub(crate) const SEED: u64 = 1001;
 /// Number of samples of a scenario, each in both arms.
@@ -94,20 +93,7 @@ pub(crate) fn functions() -> String {
     short(&hasher)
 }
 
-/// Adds the files of the scenarios below a folder.
-fn scenario_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>> {
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path.is_dir() && !NO_SCENARIOS.iter().any(|name| path.ends_with(name)) {
-            scenario_files(&path, files)?;
-        } else if path.extension().is_some_and(|end| end == "toml") {
-            files.push(path);
-        }
-    }
-    Ok(())
-}
-
-/// Returns the arms that are run: those of the function if a human drives the ego, and the two stacks otherwise.
+/// Returns the arms that are run: the function's arms if a human drives the ego, and the two stacks otherwise.
 fn arms(file: &ScenarioFile) -> [ControllerChoice; 2] {
     match file.config().function {
         Function::AebWithHuman => ControllerChoice::of_function(Function::AebWithHuman),
@@ -145,10 +131,9 @@ pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> R
 
 /// Returns the digests of this program on this machine.
 pub(crate) fn digests() -> Result<Digests, Box<dyn Error>> {
-    let (root, mut paths) = (Path::new(crate::ROOT).join(LIBRARY), Vec::new());
-    scenario_files(&root, &mut paths)?;
+    let root = Path::new(crate::ROOT).join(LIBRARY);
     let mut by_scenario = BTreeMap::new();
-    for path in paths {
+    for path in expand(std::slice::from_ref(&root))? {
         let file = ScenarioFile::load(&path, &[])?;
         let of_mode = |(name, mode)| Ok((String::from(name), outcomes(&file, mode, SEED)?));
         let digests = MODES.into_iter().map(of_mode).collect::<Result<_, Box<dyn Error>>>()?;

@@ -13,7 +13,7 @@ pub(super) fn tables(judged: &Judgement, scenario: &str) -> Markup {
     html! {
         @if !results.is_empty() {
             h3 { "Coverage that the scenario asks for" }
-            p.note { "The weight of a bin is its probability, by the distributions of the scenario. Collisions are those of the ego, arm by arm." }
+            p.note { "The weight of a bin is its probability, by the distributions of the scenario. Collisions are the ego's, arm by arm." }
             (table(
                 &html! { (text_heads(&["item or cross", "bins of"])) (number_heads(&["bins", "covered", "share", "samples in none"])) },
                 &html! {

@@ -81,6 +81,18 @@ fn with_names(names: &[String], rows: &str) -> String {
     named
 }
 
+/// Returns an expression that a browser breaks only between words: at spaces, after `_` and `(`, and after a `.` between
+/// names.
+pub(crate) fn breakable(expression: &str) -> Markup {
+    let mut last = ' ';
+    let ends_word = |letter: char| {
+        let is_end = matches!(letter, '_' | '(') || letter == '.' && last.is_alphabetic();
+        last = letter;
+        is_end
+    };
+    html! { @for piece in expression.split_inclusive(ends_word) { (piece) wbr; } }
+}
+
 /// Returns the heads of columns of text.
 pub fn text_heads(names: &[&str]) -> Markup {
     html! { @for name in names { @if name.is_empty() { td {} } @else { th { (name) } } } }
@@ -112,6 +124,22 @@ mod tests {
         let table = table(&head, &rows).into_string();
         let body = table.split_once("<tbody>").unwrap().1;
         assert_eq!(body.matches("data-name=\"sample\"").count(), 2, "{body}");
+    }
+
+    #[test]
+    fn an_expression_is_broken_between_words_alone() {
+        let expression = "upper(imposed_braking_mps2 > 3 | baseline.imposed_braking_mps2 < 3) <= 0.05";
+        let written = breakable(expression).into_string();
+        let pieces: Vec<&str> = written.split("<wbr>").flat_map(|piece| piece.split(' ')).collect();
+        // A cell on a page of 390 px has room for some 30 letters, and in a narrow column for 16.
+        assert!(pieces.iter().all(|piece| piece.len() <= 16), "{pieces:?}");
+        for word in ["upper(", "imposed_", "braking_", "mps2", "baseline.", "0.05"] {
+            assert!(pieces.contains(&word), "{word}: {pieces:?}");
+        }
+        // What is copied from the page is the expression.
+        assert_eq!(written.replace("<wbr>", "").replace("&gt;", ">").replace("&lt;", "<"), expression);
+        // The style sheet leaves the pieces whole: `anywhere` would let a column be narrower than a word.
+        assert!(STYLE.contains("\n.gates code { overflow-wrap: break-word; }\n"));
     }
 
     #[test]

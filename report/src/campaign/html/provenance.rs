@@ -55,7 +55,7 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
         entries.extend(files(findings));
     }
     let sampling = manifest.sampling;
-    let sensors = manifest.sensors.map_or_else(|| "those of the scenario".to_owned(), |mode| mode.name().to_owned());
+    let sensors = manifest.sensors.map_or_else(|| "the scenario's".to_owned(), |mode| mode.name().to_owned());
     entries.push(("seed", sampling.seed.to_string()));
     entries.push(("design", format!("{}, {} asked for", sampling.design, counted(sampling.samples, "sample"))));
     entries.push(("sensors", sensors));

@@ -75,7 +75,7 @@ pub(super) fn evidence(findings: &Findings<'_>) -> io::Result<Markup> {
                 @for (still, recording) in stills {
                     figure {
                         @let name = format!("Recording of {}, sample {}", still.scenario, still.sample);
-                        a href=(recording) aria-label=(name) { (PreEscaped(&still.svg)) }
+                        a href=(recording) { span role="img" aria-label=(name) { (PreEscaped(&still.svg)) } }
                         figcaption {
                             strong { (still.verdict) } " " (still.scenario) ", sample " (still.sample) ": " (still.sentence) ". "
                             a href=(recording) { "Recording" } ", " a href=(card_beside(recording)) { "incident card" }

@@ -26,10 +26,19 @@ fn page() -> String {
 
 /// Returns what a report makes of some samples of scenarios of the library with and without the margin increase system.
 fn reported(names: &[&str], samples: u64, report: impl FnOnce(&Findings<'_>) -> String) -> String {
+    reported_with(names, samples, vec![ControllerChoice::ACC, ControllerChoice::MIS], report)
+}
+
+/// Returns what a report makes of some samples of scenarios of the library with these controllers.
+fn reported_with(
+    names: &[&str],
+    samples: u64,
+    controllers: Vec<ControllerChoice>,
+    report: impl FnOnce(&Findings<'_>) -> String,
+) -> String {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
     let file = |name: &&str| ScenarioFile::load(&library.join(format!("{name}.toml")), &[]).unwrap();
     let sampling = Sampling { seed: 1, design: Design::Random, samples };
-    let controllers = vec![ControllerChoice::ACC, ControllerChoice::MIS];
     let mut plan = Plan::new(names.iter().map(file).collect(), sampling, controllers).unwrap();
     plan.sensors = Some(SensorMode::GroundTruth);
     let (running, manifest): (_, Manifest) = (plan.campaign(), plan.manifest(vec!["closecall".to_owned()]).unwrap());
@@ -126,6 +135,40 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
     assert!(page.matches("<svg").count() > 3 + 1 + 8, "{}", page.matches("<svg").count());
 }
 
+/// Returns the head of a page.
+fn head_of(page: &str) -> &str {
+    page.split_once("</header>").unwrap().0.split_once("<header").unwrap().1
+}
+
+#[test]
+fn the_first_screen_has_the_unmet_gate_right_below_the_sentence_and_then_the_counts() {
+    let page = page();
+    let head = head_of(&page);
+    let at = |text: &str| head.find(text).unwrap_or_else(|| panic!("{text}: {head}"));
+    let order = [
+        "FAIL: the scenario misses a ",
+        "NOT MET: low-thw-overtake: ",
+        " collisions prevented, ",
+        "30 samples, random design",
+        "Reviewed by",
+    ]
+    .map(at);
+    assert!(order.is_sorted(), "{order:?}: {head}");
+}
+
+#[test]
+fn the_first_screen_of_a_campaign_without_a_baseline_counts_its_collisions() {
+    let controllers = vec![ControllerChoice::ACC];
+    let page = reported_with(&["low-thw-overtake"], 30, controllers, |findings| {
+        let collisions = findings.summary.total().arms[0].collisions;
+        assert!(collisions > 0);
+        let stated = format!("<p class=\"headline\">the ego collides in {collisions} of 30 samples</p>");
+        campaign(findings).unwrap().into_string().replace(&stated, "STATED")
+    });
+    let head = head_of(&page);
+    assert!(head.contains("STATED") && !head.contains("collisions prevented,"), "{head}");
+}
+
 /// More scenarios than the first screen has room for. The first has gates that fail or stay open.
 const MANY: [&str; 7] = [
     "low-thw-overtake",
@@ -184,5 +227,7 @@ fn paper_begins_with_the_signature_and_leaves_out_what_is_folded_and_each_scenar
     assert!(rule.starts_with("details, .scenario, .screen { display: none; } .paper { display: block; }"), "{rule}");
     // Colours of rules for the screen do not enlarge what is printed, and a link without words has a name.
     assert!(!page.contains("@media (max-width: 1600px)"));
-    assert!(page.contains("aria-label=\"Recording of low-thw-overtake, sample "), "a link to a recording");
+    // The name of the link is what it shows: a name beside the texts of the picture would differ from them.
+    let named = "<a href=\"recordings/low-thw-overtake-1.rrd\"><span role=\"img\" aria-label=\"Recording of low-thw-overtake, sample ";
+    assert!(page.contains(named), "a link to a recording");
 }

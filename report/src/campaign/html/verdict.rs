@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::page::{table, text_heads};
+use super::page::{breakable, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::words::{gate_words, is_said, sentence, worst_first};
 use closecall_campaign::gate::{GateResult, Standing};
@@ -49,7 +49,10 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
             p.verdict { (judged.word()) }
             div {
                 h1 { (sentence) }
-                @if let Some(line) = headline(findings) { p.headline { (line) } }
+                @if !missed.is_empty() {
+                    ul { @for gate in missed { li.failure { "NOT MET: " (gate.scenario) ": " (gate_words(gate)) } } }
+                }
+                p.headline { (headline(findings)) }
                 p.what {
                     (findings.scenarios_title()) ": " (findings.summary.controllers.join(" against ")) ", "
                     (counted(samples, "sample")) ", "
@@ -59,9 +62,6 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
                 p.what { (LETTERS) "." }
                 @if !findings.names_each() {
                     details { summary { "Names of the scenarios" } p.note { (findings.scenario_names()) } }
-                }
-                @if !missed.is_empty() {
-                    ul { @for gate in missed { li.failure { "NOT MET: " (gate.scenario) ": " (gate_words(gate)) } } }
                 }
                 @if !shown.is_empty() { ul { @for reason in shown { li { (reason) } } } }
                 @if !more.is_empty() {
@@ -73,18 +73,20 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     }
 }
 
-/// Returns the changes by the system under test, in one sentence. `None` if the campaign has no
-/// baseline.
-fn headline(findings: &Findings<'_>) -> Option<String> {
+/// Returns the counts in one sentence: the changes by the system under test, or the collisions if the
+/// campaign has no baseline.
+fn headline(findings: &Findings<'_>) -> String {
+    let total = findings.summary.total();
     if !findings.summary.is_paired() {
-        return None;
+        let collisions = total.arms.first().map_or(0, |arm| arm.collisions);
+        return format!("the ego collides in {collisions} of {}", counted(total.samples, "sample"));
     }
-    let pairs = findings.summary.total().pairs;
+    let pairs = total.pairs;
     let without = pairs.prevented + pairs.both;
-    Some(format!(
+    format!(
         "{} of {without} collisions prevented, {} induced; harm prevented {:.3}, induced {:.3}",
         pairs.prevented, pairs.induced, pairs.prevented_harm, pairs.induced_harm
-    ))
+    )
 }
 
 const fn standing_class(standing: Standing) -> &'static str {
@@ -148,7 +150,7 @@ fn gate_table(gates: &[&GateResult]) -> Markup {
                 td { (gate.scenario) }
                 td { (gate.source.to_string()) }
                 td { (gate_words(gate)) }
-                td { code { (gate.expression.to_string()) } }
+                td { code { (breakable(&gate.expression.to_string())) } }
             }
         }
     };

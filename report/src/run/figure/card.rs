@@ -25,6 +25,8 @@ const STEP: Time = Time::from_ms(200);
 const AWAY_M: f64 = 400.0;
 /// Size of the letter on a vehicle (m in the picture): 11 px on a page of 390 px.
 const LETTER_M: f64 = 3.7;
+/// Distance of the name of a vehicle that collides above its body (m in the picture).
+const NAME_ABOVE_M: f64 = 0.4;
 /// Height of a capital letter as a share of its size.
 const CAPITAL: f64 = 0.73;
 /// Size of a plot of headways, its font, and its margin (px). It fits a page of 390 px.
@@ -70,7 +72,7 @@ fn sections(films: &[Film], window: Window) -> Markup {
         }
         p.note {
             "From above, in real time, from " (format!("{:.1}", window.from.s())) " to " (format!("{:.1}", window.to.s()))
-            " s: E is the ego, F the lead vehicle, R the rear vehicle; other traffic is grey. The road is drawn twice as wide as it is. "
+            " s: E is the ego, F the lead vehicle, R the rear vehicle; other traffic is grey, with a name where it collides. The road is drawn twice as wide as it is. "
             "Below: time headway in front (orange) and behind (pink), with the threshold of 0.9 s."
         }
     }
@@ -145,6 +147,12 @@ fn vehicle(film: &Film, actor: usize, window: Window) -> Markup {
             rect x=(format!("{:.1}", -0.5 * length_m)) y=(format!("{:.1}", -0.5 * width_m)) width=(format!("{length_m:.1}"))
                 height=(format!("{width_m:.1}")) rx="0.6" fill=(colour(film, actor)) { title { (film.actors[actor].name) } }
             text y=(format!("{:.2}", 0.5 * CAPITAL * LETTER_M)) font-size=(LETTER_M) text-anchor="middle" fill="#ffffff" { (letter) }
+            // Whom the sentence names is named here, too. All other traffic has no name.
+            @if letter.is_empty() && film.is_labelled(actor) {
+                text y=(format!("{:.2}", -0.5 * width_m - NAME_ABOVE_M)) font-size=(LETTER_M) text-anchor="middle" fill=(colour(film, actor)) {
+                    (film.actors[actor].name)
+                }
+            }
         }
     }
 }

@@ -8,8 +8,8 @@ use crate::run::film::Film;
 pub(super) const REACH_M: [f64; 2] = [-50.0, 70.0];
 /// The road is drawn wider than it is by this factor.
 pub(super) const STRETCH: f64 = 2.0;
-/// Room above and below the road (m in the picture).
-const ROOM_M: f64 = 1.5;
+/// Room above and below the road, for the name of a truck in the left lane (m in the picture).
+const ROOM_M: f64 = 2.5;
 
 /// Returns the road of a film with these vehicles on it. Lengths are in metres, widths are
 /// stretched by [`STRETCH`].

@@ -5,7 +5,7 @@ use closecall_traffic::{AccelerationLane, Lane, Measured, VehicleState, maths};
 use super::chart::tick_text;
 use super::colours::colour;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
-use crate::run::film::{Film, Frame, Part};
+use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::CRITICAL_THW_S;
 
 pub(super) const ASPHALT: &str = "#e9eaec";
@@ -174,22 +174,15 @@ impl Strip<'_> {
         self.at(state.s_m + along * 0.5 * size.length_m, state.d_m + across * 0.5 * size.width_m)
     }
 
-    /// Writes the name and the speed of each main vehicle in the picture, and of each vehicle that
-    /// collides. `occupied` has the areas of other texts. A label covers no other text, and no body
+    /// Writes the name and the speed of the ego, the lead and the rear vehicle in the picture, and of each vehicle
+    /// that collides. `occupied` has the areas of other texts. A label covers no other text, and no body
     /// if there is room elsewhere. A label without room is left out.
     fn labels(&self, svg: &mut Svg, present: &[usize], occupied: &mut Vec<Area>) {
         let bodies: Vec<Area> = present.iter().map(|&actor| self.body(actor)).collect();
-        let rank = |actor: &usize| match self.film.actors[*actor].part {
-            Part::Ego => 0,
-            Part::Lead | Part::Rear => 1,
-            // Who struck whom is told before who drives beside.
-            Part::Other(_) | Part::Background if self.film.collides(*actor) => 1,
-            Part::Other(_) | Part::Background => 2,
-        };
-        let is_told = |actor: usize| self.film.is_main(actor) || self.film.collides(actor);
-        let is_named = |actor: &usize| is_told(*actor) && overlap(self.body(*actor), self.area);
+        let is_other = |actor: &usize| *actor != self.film.ego;
+        let is_named = |actor: &usize| self.film.is_labelled(*actor) && overlap(self.body(*actor), self.area);
         let mut named: Vec<usize> = present.iter().copied().filter(is_named).collect();
-        named.sort_by_key(rank);
+        named.sort_by_key(is_other);
         for actor in named {
             let text = format!("{} {:.1} m/s", self.film.vehicle_label(actor), self.frame.states[actor].speed_mps);
             let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;

@@ -3,7 +3,7 @@ use std::path::Path;
 use closecall_scenarios::sampling::Design;
 
 use super::*;
-use crate::run::film::{Film, FilmRecorder, Level};
+use crate::run::film::{Film, FilmRecorder, Level, Part};
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::outcome::{ClosedBy, Collision, Phase};
@@ -130,13 +130,32 @@ fn labels_of_several_rear_vehicles_cover_each_other_nowhere_and_lie_on_the_road(
 #[test]
 fn a_vehicle_outside_of_the_picture_has_no_label() {
     let films = films("rear-vehicles-one-after-another", &[ControllerChoice::MIS]);
-    // At the start, the third vehicle is farther behind than the picture reaches.
     let film = &films[0];
-    let mut svg = svg::Svg::new([560.0, 330.0]);
-    let area = svg::Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };
-    strip::draw(&mut svg, (film, None), 0, (area, [-65.0, 75.0]));
-    let text = svg.finish();
-    assert!(text.contains(">E ego ") && !text.contains(">third "), "{text}");
+    let rear = film.actors.iter().position(|actor| actor.part == Part::Rear).unwrap();
+    let states = &film.frames[0].states;
+    let ahead_m = states[rear].s_m - states[film.ego].s_m;
+    let drawn = |rear_end_m: f64| {
+        let mut svg = svg::Svg::new([560.0, 330.0]);
+        let area = svg::Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };
+        strip::draw(&mut svg, (film, None), 0, (area, [rear_end_m, 75.0]));
+        svg.finish()
+    };
+    let [within, beyond] = [drawn(ahead_m - 20.0), drawn(ahead_m + 20.0)];
+    assert!(within.contains(">E ego ") && within.contains(">R rear "), "{within}");
+    assert!(beyond.contains(">E ego ") && !beyond.contains(">R rear "), "{beyond}");
+}
+
+#[test]
+fn from_above_only_ego_lead_and_rear_vehicle_and_vehicles_that_collide_are_named() {
+    let films = films("rear-vehicles-one-after-another", &[ControllerChoice::ACC]);
+    let film = &films[0];
+    let text = encounter(&films);
+    let others: Vec<usize> = (0..film.actors.len()).filter(|&actor| !film.is_labelled(actor)).collect();
+    assert!(others.iter().any(|&actor| film.is_main(actor)), "a vehicle right behind the ego that does not collide");
+    for actor in 0..film.actors.len() {
+        let label = format!(">{} ", film.vehicle_label(actor));
+        assert_eq!(text.contains(&label), !others.contains(&actor), "{label}");
+    }
 }
 
 #[test]
@@ -175,4 +194,16 @@ fn a_still_is_narrow_enough_for_a_phone_and_names_a_vehicle_of_the_background_th
     film.outcome.as_mut().unwrap().collisions = vec![collision];
     assert!(film.collides(other) && film.collides(film.ego), "{name}");
     assert!(drawn(film).contains(&label), "{}", drawn(film));
+    // The sentence of a card names it, and so does the picture.
+    let ego = film.ego;
+    for frame in &mut film.frames[index..] {
+        let [s_m, d_m] = [frame.states[ego].s_m, frame.states[ego].d_m];
+        frame.states[other].s_m = s_m - 9.0;
+        frame.states[other].d_m = d_m;
+    }
+    let label = format!(">{name}</text>");
+    let with_collision = card(&films, "closecall replay . 0");
+    assert_eq!(with_collision.matches(&label).count(), 1, "{with_collision}");
+    films[0].outcome.as_mut().unwrap().collisions.clear();
+    assert!(!card(&films, "closecall replay . 0").contains(&label));
 }

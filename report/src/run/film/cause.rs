@@ -1,9 +1,7 @@
-//! The cause of a run's end: the sentence about it, the letters of its vehicles, and how long the
-//! reason of the system held.
+//! The cause of a run's end: the sentence about it, and the letters of its vehicles.
 
 use closecall_scenarios::causal::CausalSentence;
-use closecall_scenarios::outcome::{Collision, Outcome};
-use closecall_traffic::Time;
+use closecall_scenarios::outcome::Collision;
 
 use super::{Film, Part};
 
@@ -12,9 +10,8 @@ impl Film {
     /// why, which faults held. `None` for recorded traffic.
     pub(in crate::run) fn sentence(&self) -> Option<CausalSentence<'_>> {
         let outcome = self.outcome.as_ref()?;
-        let reason_span_s = self.reason_span_s(outcome);
         let engaged_for = self.engaged_for();
-        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, reason_span_s, engaged_for })
+        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, engaged_for })
     }
 
     /// Returns the sentence about the run as text.
@@ -62,23 +59,5 @@ impl Film {
             Part::Other(_) | Part::Background => return name.clone(),
         };
         format!("{letter} {name}")
-    }
-
-    /// Returns the longest time over which the controller gave the reason of the outcome (s).
-    fn reason_span_s(&self, outcome: &Outcome) -> Option<[f64; 2]> {
-        let reason = outcome.mis.as_ref().ok()?.reason;
-        let mut spans: Vec<[Time; 2]> = Vec::new();
-        let mut is_open = false;
-        for frame in &self.frames {
-            let holds = frame.command.is_some_and(|command| command.reason == reason);
-            match (holds, spans.last_mut().filter(|_| is_open)) {
-                (true, Some(span)) => span[1] = frame.time,
-                (true, None) => spans.push([frame.time; 2]),
-                (false, _) => {}
-            }
-            is_open = holds;
-        }
-        let longest = spans.into_iter().max_by_key(|span| span[1] - span[0])?;
-        Some(longest.map(Time::s))
     }
 }

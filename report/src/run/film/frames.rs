@@ -254,6 +254,12 @@ impl Film {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.collisions)
     }
 
+    /// Returns true if a drawing from above has the name of a vehicle: the ego, the lead vehicle and the rear vehicle have
+    /// one, and each vehicle that collides.
+    pub(in crate::run) fn is_labelled(&self, actor: usize) -> bool {
+        matches!(self.actors[actor].part, Part::Ego | Part::Lead | Part::Rear) || self.collides(actor)
+    }
+
     /// Returns true if a vehicle has a part in a collision.
     pub(in crate::run) fn collides(&self, actor: usize) -> bool {
         let name = self.actors[actor].name.as_str();

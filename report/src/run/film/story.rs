@@ -4,7 +4,7 @@ use closecall_controllers::{DriverNote, EgoState};
 use closecall_traffic::Time;
 
 use super::{Film, headway_text};
-use crate::run::text::{reason_text, touch_text};
+use crate::run::text::touch_text;
 use closecall_scenarios::outcome::Collision;
 use closecall_simulation::RunEvent;
 
@@ -61,7 +61,7 @@ impl Film {
                 };
                 format!("The MIS engaged at {engaged_at_s:.2} s ({}).{gained}", mis.reason)
             }
-            Err(_) => format!("The MIS never engaged ({}).", reason_text(mis)),
+            Err(_) => format!("The MIS never engaged ({}).", mis.reason_words()),
         })
     }
 

@@ -6,7 +6,6 @@ use std::fmt::Write as _;
 use closecall_traffic::{Measured, Time};
 
 use crate::run::film::{Film, fate_word, headway_text, headways};
-use crate::run::text::reason_text;
 use closecall_campaign::ledger::PairFate;
 use closecall_scenarios::causal::{CausalSentence, LETTERS};
 
@@ -180,7 +179,7 @@ fn push_table(page: &mut String, film: &Film) {
             row("front headway then", &WithUnit(mis.thw_front_at_engagement_s, "s"));
             row("front headway at the critical distance", &WithUnit(mis.thw_front_at_critical_s, "s"));
             row("mean braking", &WithUnit(mis.mean_deceleration_mps2, "m/s²"));
-            row("reason", &reason_text(mis));
+            row("reason", &mis.reason_words());
         }
         Err(absent) => row("MIS", absent),
     }

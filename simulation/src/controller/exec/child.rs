@@ -7,6 +7,7 @@
 
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel};
@@ -14,11 +15,12 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, waitid};
 
 use super::error::{ExecError, is_long};
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::processes::{self, Entry};
+use super::protocol::END;
 use super::settings::ExecSettings;
 use super::start;
 
@@ -163,12 +165,13 @@ impl Child {
         answer
     }
 
-    /// Closes the standard input of the process, and checks that it has written only its answers.
-    /// The process has a short time to end by itself.
+    /// Closes the standard input of the process, and checks that it has written only its answers,
+    /// and that no signal ends it. A process that does not end by itself in a short time is killed,
+    /// which is no error.
     ///
     /// # Errors
     /// [`ExecError`] if a line is left over: an earlier line may have been taken for the answer to
-    /// another question.
+    /// another question. [`ExecError::BadEnd`] if the process ends by a signal.
     pub fn finish(&mut self) -> Result<(), ExecError> {
         self.requests = None;
         let started = Instant::now();
@@ -177,11 +180,8 @@ impl Child {
             match self.receive_within(FINISH_POLL_INTERVAL) {
                 Ok(line) => break Some(line),
                 Err(RecvTimeoutError::Disconnected) => break None,
-                Err(RecvTimeoutError::Timeout) if started.elapsed() >= EXIT_TIMEOUT => {
-                    // It has had its time to end by itself.
-                    self.has_failed = true;
-                    break None;
-                }
+                // It has had its time to end by itself.
+                Err(RecvTimeoutError::Timeout) if started.elapsed() >= EXIT_TIMEOUT => break None,
                 // A descendant may hold the pipe open after the end of the process. What the
                 // process has written still arrives.
                 Err(RecvTimeoutError::Timeout) if ended.is_some_and(|at| at.elapsed() >= DRAIN_TIMEOUT) => break None,
@@ -193,7 +193,7 @@ impl Child {
             }
         };
         match left_over {
-            None => Ok(()),
+            None => self.check_end(EXIT_TIMEOUT.saturating_sub(started.elapsed())),
             Some(line) => {
                 self.has_failed = true;
                 Err(match line {
@@ -202,6 +202,33 @@ impl Child {
                 })
             }
         }
+    }
+
+    /// Works like [`Self::finish`], for a process of this program with nothing left to do than to
+    /// unload a library. How that ends the process is no error: the process of a campaign unloads the
+    /// library after all its samples.
+    ///
+    /// # Errors
+    /// [`ExecError`] if a line is left over.
+    pub fn finish_unloading(&mut self) -> Result<(), ExecError> {
+        match self.finish() {
+            Err(ExecError::BadEnd { .. }) => Ok(()),
+            finished => finished,
+        }
+    }
+
+    /// Lets a process of this program free what it has run, and then ends it like
+    /// [`Self::finish_unloading`]. `limit` is the time limit of the freeing.
+    ///
+    /// # Errors
+    /// [`ExecError`] if the process ends or hangs as it frees it, or if a line is left over.
+    pub fn finish_run(&mut self, limit: Duration) -> Result<(), ExecError> {
+        let answer = self.request(format!("{END}\n").into_bytes(), limit)?;
+        if answer != END.as_bytes() {
+            self.has_failed = true;
+            return Err(ExecError::OutOfTurn { answered: self.answered.saturating_sub(1), line: excerpt(&answer) });
+        }
+        self.finish_unloading()
     }
 
     /// Returns the files that the process has mapped or opened, if the system tells.
@@ -369,6 +396,23 @@ impl Child {
         match status {
             Ok(status) if has_ended => ExecError::Ended { status, answered, stderr: self.last_lines() },
             _ => ExecError::Closed { answered, stderr: self.last_lines() },
+        }
+    }
+
+    /// Checks how the process ends by itself within `limit`. If it does not, it is killed, which is
+    /// no error.
+    fn check_end(&mut self, limit: Duration) -> Result<(), ExecError> {
+        let has_ended = self.ends_within(limit);
+        // The system may still write the memory dump of a process that has crashed. Its status then
+        // names the signal of the crash.
+        let is_killed = |status: process::ExitStatus| !has_ended && status.signal() == Some(Signal::KILL.as_raw());
+        match self.reap() {
+            Ok(status) if status.signal().is_some() && !is_killed(status) => {
+                // What the process wrote before its end may still be in the pipe.
+                let _ = self.stderr_end.recv_timeout(EXIT_TIMEOUT);
+                Err(ExecError::BadEnd { status, stderr: self.last_lines() })
+            }
+            Ok(_) | Err(_) => Ok(()),
         }
     }
 

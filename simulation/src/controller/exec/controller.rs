@@ -10,9 +10,8 @@ use closecall_traffic::{Road, Time};
 
 use super::child::Child;
 use super::error::ExecError;
-use super::protocol::Identity;
 use super::settings::ExecSettings;
-use super::{NAME, protocol};
+use super::{Identity, NAME, protocol};
 use crate::run::ControllerFactory;
 
 /// Time limit of the answer to the first message. The process may first have to load an interpreter and its libraries,
@@ -163,6 +162,9 @@ impl EgoController for ExecController {
     }
 
     fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
-        self.child.as_mut().map_or(Ok(()), Child::finish).map_err(|error| self.failure(&error, time))
+        let Some(child) = &mut self.child else { return Ok(()) };
+        // The process of a library or an FMU first frees the controller.
+        let finished = if self.repeats_time { child.finish_run(self.settings.timeout()) } else { child.finish() };
+        finished.map_err(|error| self.failure(&error, time))
     }
 }

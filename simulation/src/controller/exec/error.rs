@@ -26,12 +26,20 @@ pub enum ExecError {
         source: io::Error,
     },
     /// The process ended.
-    #[error("the process ended ({status}) {}{}", when(*answered), last_lines(stderr))]
+    #[error("the process ended ({}) {}{}", how(*status), when(*answered), last_lines(stderr))]
     Ended {
         /// Its exit status.
         status: ExitStatus,
         /// Number of answers before, including the greeting.
         answered: u64,
+        /// The last lines of its standard error.
+        stderr: String,
+    },
+    /// The process ended by a signal after its last answer.
+    #[error("the process crashed ({}) after its last answer, when its input was closed{}", how(*status), last_lines(stderr))]
+    BadEnd {
+        /// Its exit status.
+        status: ExitStatus,
         /// The last lines of its standard error.
         stderr: String,
     },
@@ -150,10 +158,8 @@ impl ExecError {
     /// samples.
     pub fn end_of_isolated(&self, who: &str) -> Option<String> {
         match self {
-            Self::Ended { status, stderr, .. } => {
-                // Whether the system keeps a memory dump depends on its settings.
-                let status = status.to_string().replace(" (core dumped)", "");
-                Some(format!("{who} ended its process ({status}){}", last_lines(stderr)))
+            Self::Ended { status, stderr, .. } | Self::BadEnd { status, stderr } => {
+                Some(format!("{who} ended its process ({}){}", how(*status), last_lines(stderr)))
             }
             Self::Closed { stderr, .. } => {
                 Some(format!("{who} closed the output of its process{}", last_lines(stderr)))
@@ -163,9 +169,15 @@ impl ExecError {
     }
 }
 
-/// Returns true if a time limit is as long as that of a start: whoever exceeds it hangs.
+/// Returns true if a time limit is as long as the limit of a start: whoever exceeds it hangs.
 pub(super) const fn is_long(limit_ms: u128) -> bool {
     limit_ms >= 10_000
+}
+
+/// Describes how a process ended: its exit status, or the name of its signal.
+fn how(status: ExitStatus) -> String {
+    // Whether the system keeps a memory dump depends on its settings.
+    status.to_string().replace(" (core dumped)", "")
 }
 
 /// Describes when an error happened by the number of answers before it. The first answer is the

@@ -39,7 +39,8 @@
 //!    then compared.
 //! 5. At the end of the run Closecall closes the standard input and reads the rest of the output. A
 //!    line without a question is an error, here and before each step: another line may have been
-//!    taken for the answer to another step.
+//!    taken for the answer to another step. So is an end by a signal, unless Closecall itself kills
+//!    the process half a second later.
 //!
 //! # Errors
 //! If the process does not give a valid answer, the sample ends as an error with a message that
@@ -57,12 +58,12 @@ mod settings;
 mod start;
 
 pub use child::Child;
+pub use closecall_controllers::external::Identity;
 pub(crate) use controller::START_TIMEOUT;
 pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
 pub use lines::NEW_SAMPLE;
 pub(crate) use lines::excerpt;
 pub use processes::{adopt_orphans, end_all};
-pub use protocol::Identity;
-pub(crate) use protocol::{PROTOCOL, RoadMessage, check_hello, to_line};
+pub(crate) use protocol::{PROTOCOL, check_hello, to_line};
 pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME};

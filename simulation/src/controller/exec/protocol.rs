@@ -1,7 +1,8 @@
 //! Writes the messages to a process, and parses its answers.
 
-use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front, Odometry, SensorAvailability};
-use closecall_traffic::{CONTROL_STEP, Road, Side, Source, Track, TrackId, TrackStatus};
+use closecall_controllers::external::{Identity, RoadMessage, StepMessage};
+use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front};
+use closecall_traffic::{CONTROL_STEP, Road};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -10,6 +11,10 @@ use super::lines::excerpt;
 
 /// Version of the protocol.
 pub(crate) const PROTOCOL: u32 = 1;
+
+/// The line that asks a process of this program to free what it has run, and the line that answers
+/// it. The protocol of other processes does not have it.
+pub(super) const END: &str = r#"{"type":"end"}"#;
 
 const ACCELERATION_KEY: &str = "acceleration_mps2";
 const STATE_KEY: &str = "state";
@@ -20,97 +25,7 @@ const TIME_KEY: &str = "time_ns";
 #[serde(tag = "type", rename_all = "kebab-case")]
 enum Message<'a> {
     Hello { protocol: u32, control_step_s: f64, settings: &'a EgoSettings, road: RoadMessage },
-    Step(StepMessage<'a>),
-}
-
-/// The road in the first message to a process.
-#[derive(Serialize)]
-pub(crate) struct RoadMessage {
-    lanes: u8,
-    lane_width_m: f64,
-    curvature_per_m: f64,
-    speed_limit_mps: f64,
-    overtaking_side: Side,
-}
-
-impl RoadMessage {
-    pub(crate) fn of(road: &Road) -> Self {
-        Self {
-            lanes: road.lanes(),
-            lane_width_m: road.lane_width_m(),
-            curvature_per_m: road.curvature_per_m(),
-            speed_limit_mps: road.speed_limit_mps(),
-            overtaking_side: road.overtaking_side(),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct StepMessage<'a> {
-    time_s: f64,
-    time_ns: i64,
-    odometry: &'a Odometry,
-    front: Option<Front>,
-    tracks: Vec<TrackMessage>,
-    sensors: SensorAvailability,
-}
-
-#[derive(Serialize)]
-struct TrackMessage {
-    id: TrackId,
-    source: Source,
-    status: TrackStatus,
-    time_s: f64,
-    x_m: f64,
-    y_m: f64,
-    vx_mps: f64,
-    vy_mps: f64,
-    covariance: [[f64; 4]; 4],
-    heading_rad: f64,
-    length_m: f64,
-    width_m: f64,
-    class: ClassMessage,
-    existence: f64,
-    lane: LaneMessage,
-}
-
-#[derive(Serialize)]
-struct ClassMessage {
-    car: f64,
-    truck: f64,
-    motorcycle: f64,
-    background: f64,
-}
-
-#[derive(Serialize)]
-struct LaneMessage {
-    left: f64,
-    own: f64,
-    right: f64,
-}
-
-impl From<&Track> for TrackMessage {
-    fn from(track: &Track) -> Self {
-        let [car, truck, motorcycle, background] = track.class.0;
-        let [left, own, right] = track.lane;
-        Self {
-            id: track.id,
-            source: track.source,
-            status: track.status,
-            time_s: track.time.s(),
-            x_m: track.x_m(),
-            y_m: track.y_m(),
-            vx_mps: track.vx_mps(),
-            vy_mps: track.vy_mps(),
-            covariance: std::array::from_fn(|row| std::array::from_fn(|column| track.covariance[(row, column)])),
-            heading_rad: track.heading_rad,
-            length_m: track.length_m,
-            width_m: track.width_m,
-            class: ClassMessage { car, truck, motorcycle, background },
-            existence: track.existence,
-            lane: LaneMessage { left, own, right },
-        }
-    }
+    Step(StepMessage),
 }
 
 /// The mark by which some runtimes begin a text: U+FEFF in UTF-8.
@@ -124,14 +39,7 @@ pub(super) fn hello(settings: &EgoSettings, road: &Road) -> Vec<u8> {
 
 /// Returns the message of a control step. `front` is the lead vehicle.
 pub(super) fn step(input: &EgoInput<'_>, front: Option<Front>) -> Vec<u8> {
-    to_line(&Message::Step(StepMessage {
-        time_s: input.time.s(),
-        time_ns: input.time.ns(),
-        odometry: &input.odometry,
-        front,
-        tracks: input.tracks.iter().map(TrackMessage::from).collect(),
-        sensors: input.sensors,
-    }))
+    to_line(&Message::Step(StepMessage::new(input, front)))
 }
 
 /// Returns a message as a line of JSON.
@@ -147,17 +55,6 @@ pub(crate) fn to_line(message: &impl Serialize) -> Vec<u8> {
 pub(super) struct Answer {
     pub(super) acceleration_mps2: f64,
     pub(super) state: EgoState,
-}
-
-/// The statements of a process in its first answer.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    /// Its name.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Its version.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub version: Option<String>,
 }
 
 /// Checks the answer to the first message, and returns what the process states about itself.

@@ -3,6 +3,8 @@
 use std::ffi::{c_char, c_void};
 use std::mem::size_of;
 
+use crate::perception::message::RadarDetection;
+
 /// The version of the interface.
 pub(super) const ABI: u32 = 1;
 
@@ -86,14 +88,6 @@ pub(super) struct Scan {
     pub(super) intensity: *const f32,
     pub(super) beam: *const u16,
     pub(super) offset_ns: *const u32,
-}
-
-/// A detection of a radar.
-#[repr(C)]
-pub(super) struct RadarDetection {
-    pub(super) range_m: f64,
-    pub(super) azimuth_rad: f64,
-    pub(super) radial_mps: f64,
 }
 
 /// A scan of a rear radar.

@@ -11,9 +11,9 @@ use super::abi::{
     ABI, AbiFunction, AnswerView, AnswersFunction, CreateFunction, DestroyFunction, Detection, ErrorFunction,
     StepFunction, TextFunction, Track,
 };
-use super::message::Scans;
 use super::view::{Setup, with_input};
 use crate::perception::answer::{Kind, MOST_OBJECTS, USUAL_TOP_M};
+use crate::perception::message::Scans;
 
 /// The functions that a library must export.
 const NEEDED: [&str; 5] = [

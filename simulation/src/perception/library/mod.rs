@@ -15,7 +15,6 @@
 
 mod abi;
 mod loaded;
-mod message;
 mod view;
 
 use std::io::{BufRead, Write};
@@ -25,11 +24,11 @@ use serde_json::{Value, json};
 
 use self::abi::{Detection, Track};
 use self::loaded::{Library, Objects, Run};
-use self::message::Message;
 use self::view::Setup;
 use crate::controller::exec::PROTOCOL;
 use crate::controller::native::Probe;
 use crate::perception::answer::ERROR_KEY;
+use crate::perception::message::Message;
 
 /// Loads a library in this process, and returns what it is.
 pub fn probe(path: &Path) -> Probe {
@@ -78,6 +77,10 @@ pub fn serve(path: &Path, requests: impl BufRead, mut answers: impl Write) -> Re
                     }
                     Err(reason) => json!({ "time_ns": question.time_ns, ERROR_KEY: reason }),
                 }
+            }
+            Message::End => {
+                drop(run.take());
+                json!({ "type": "end" })
             }
         };
         let written = writeln!(answers, "{answer}").and_then(|()| answers.flush());

@@ -2,10 +2,12 @@
 
 use std::ffi::CString;
 
+use closecall_sensors::external::RadarMount;
+use closecall_sensors::lidar::MirrorSide;
 use closecall_traffic::Side;
 
 use super::abi;
-use super::message::{Hello, Lidar, MirrorSide, Points, Radar, RadarDetection, Scans};
+use crate::perception::message::{Hello, Lidar, Points, Scans};
 
 /// The data that a perception receives when it is created.
 pub(super) struct Setup {
@@ -23,7 +25,7 @@ impl Setup {
 
     /// Calls `f` with the setup in the form of the interface.
     pub(super) fn with_view<T>(&self, f: impl FnOnce(&abi::SetupView) -> T) -> T {
-        let Hello { control_step_s, latency_s, ego, road, lidars, radars, camera } = &self.hello;
+        let Hello { control_step_s, latency_s, ego, road, lidars, radars, camera, .. } = &self.hello;
         let lidar = |(lidar, name): (&Lidar, &CString)| abi::Lidar {
             name: name.as_ptr(),
             x_m: lidar.x_m,
@@ -33,10 +35,10 @@ impl Setup {
             half_field_rad: lidar.half_field_rad,
             range_m: lidar.range_m,
             period_s: lidar.period_s,
-            layers: lidar.layers,
-            columns: lidar.columns,
+            layers: whole(lidar.layers),
+            columns: whole(lidar.columns),
         };
-        let radar = |radar: &Radar| abi::Radar {
+        let radar = |radar: &RadarMount| abi::Radar {
             side: number_of(radar.side),
             reserved: 0,
             x_m: radar.x_m,
@@ -50,7 +52,7 @@ impl Setup {
             radial_sd_mps: radar.radial_sd_mps,
         };
         let lidar_list: Vec<abi::Lidar> = lidars.iter().zip(&self.names).map(lidar).collect();
-        let radar_list: Vec<abi::Radar> = radars.iter().map(radar).collect();
+        let radar_list: Vec<abi::Radar> = radars.iter().flatten().map(radar).collect();
         let camera_view = camera.as_ref().map(|camera| abi::Camera {
             x_m: camera.x_m,
             z_m: camera.z_m,
@@ -60,8 +62,8 @@ impl Setup {
             distortion_k1: camera.distortion_k1,
             distortion_k2: camera.distortion_k2,
             period_s: camera.period_s,
-            width: camera.width,
-            height: camera.height,
+            width: whole(camera.width),
+            height: whole(camera.height),
         });
         f(&abi::SetupView {
             control_step_s: *control_step_s,
@@ -71,7 +73,7 @@ impl Setup {
             lane_width_m: road.lane_width_m,
             curvature_per_m: road.curvature_per_m,
             speed_limit_mps: road.speed_limit_mps,
-            lanes: road.lanes,
+            lanes: road.lanes.into(),
             overtaking_side: number_of(road.overtaking_side),
             lidars: lidar_list.as_ptr(),
             lidar_count: lidar_list.len() as u64,
@@ -116,23 +118,16 @@ pub(super) fn with_input<T>(
             offset_ns: points.offset_ns.as_ptr(),
         });
     }
-    let detection = |detection: &RadarDetection| abi::RadarDetection {
-        range_m: detection.range_m,
-        azimuth_rad: detection.azimuth_rad,
-        radial_mps: detection.radial_mps,
-    };
-    let detections: Vec<Vec<abi::RadarDetection>> =
-        question.radar_scans.iter().map(|scan| scan.detections.iter().map(detection).collect()).collect();
     let radar_scans: Vec<abi::RadarScan> = question
         .radar_scans
         .iter()
-        .zip(&detections)
-        .map(|(scan, detections)| abi::RadarScan {
+        .flatten()
+        .map(|scan| abi::RadarScan {
             side: number_of(scan.side),
             reserved: 0,
             time_ns: scan.time_ns,
-            detection_count: detections.len() as u64,
-            detections: detections.as_ptr(),
+            detection_count: scan.detections.len() as u64,
+            detections: scan.detections.as_ptr(),
         })
         .collect();
     let rgb = question.image.as_ref().map(|image| image.decode()).transpose()?;
@@ -153,7 +148,7 @@ pub(super) fn with_input<T>(
         pose_x_m: pose.x_m,
         pose_y_m: pose.y_m,
         pose_yaw_rad: pose.yaw_rad,
-        lane: odometry.lane,
+        lane: odometry.lane.into(),
         reserved: 0,
         scans: scans.as_ptr(),
         scan_count: scans.len() as u64,
@@ -161,6 +156,11 @@ pub(super) fn with_input<T>(
         radar_scan_count: radar_scans.len() as u64,
         image: image.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
     }))
+}
+
+/// Returns a number of the greeting as the interface has it.
+fn whole(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 /// Returns the number of a side in the interface.

@@ -188,7 +188,7 @@ impl Design {
             })
         };
         let is_event = outputs.iter().flatten().all(|output| *output == 0.0 || (output - 1.0).abs() <= f64::EPSILON);
-        // A mean lies where the outputs can lie: that of harm is not negative, that of an event at most 1.
+        // A mean lies where the outputs can lie: the mean of harm is not negative, the mean of an event at most 1.
         let is_positive = outputs.iter().flatten().all(|output| *output >= 0.0);
         let range = [if is_positive { 0.0 } else { f64::NEG_INFINITY }, if is_event { 1.0 } else { f64::INFINITY }];
         let bounded = |quarter: usize| mean(quarter).map(|mean| mean.within(range));

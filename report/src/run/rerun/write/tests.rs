@@ -569,15 +569,17 @@ fn no_curve_is_so_thin_that_its_colour_fades() {
     assert!(widths > 20, "{widths}");
 }
 
+/// Returns the names beside the vehicles in the view from above.
+fn names_from_above(data: &[Chunk]) -> Vec<String> {
+    let names = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names");
+    names.flat_map(|chunk| texts(chunk, "Points2D:labels")).collect()
+}
+
 #[test]
 fn the_vehicles_next_to_the_ego_have_names_from_above_and_the_scene_shows_no_label() {
     let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Objects));
     let data = chunks(&[film], StoreKind::Recording);
-    let labels: Vec<String> = data
-        .iter()
-        .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
-        .flat_map(|chunk| texts(chunk, "Points2D:labels"))
-        .collect();
+    let labels = names_from_above(&data);
     for name in ["R rear ", "second "] {
         assert!(labels.iter().any(|label| label.starts_with(name) && label.ends_with(" behind")), "{name}");
     }
@@ -606,11 +608,7 @@ fn the_verdict_names_the_vehicle_that_was_seen_and_the_vehicle_of_the_engagement
 fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
     let film = filmed("faults/object-ghost", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
     let data = chunks(std::slice::from_ref(&film), StoreKind::Recording);
-    let labels: Vec<String> = data
-        .iter()
-        .filter(|chunk| chunk.entity_path().to_string() == "/mis/bird/names")
-        .flat_map(|chunk| texts(chunk, "Points2D:labels"))
-        .collect();
+    let labels = names_from_above(&data);
     assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
     let verdict = summary::verdict(&[film]);
     assert!(verdict.contains("the MIS engaged for a vehicle that does not exist at 2."), "{verdict}");

@@ -1,47 +1,45 @@
-//! The messages of the protocol as the process of a library reads them. `perception/question.rs` writes them.
+//! The messages to a perception process: `question.rs` writes them, and the process of a library reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use closecall_controllers::external::RoadMessage;
+use closecall_sensors::external::{Pose, RadarMount};
+use closecall_sensors::lidar::MirrorSide;
 use closecall_traffic::Side;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A message to the process.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 pub(super) enum Message {
     Hello(Box<Hello>),
     Scans(Box<Scans>),
+    /// The run has ended.
+    End,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Hello {
+    pub(super) kind: String,
+    pub(super) protocol: u32,
     pub(super) control_step_s: f64,
     pub(super) latency_s: f64,
     pub(super) ego: Ego,
-    pub(super) road: Road,
+    pub(super) road: RoadMessage,
     pub(super) lidars: Vec<Lidar>,
-    /// Absent without radars.
-    #[serde(default)]
-    pub(super) radars: Vec<Radar>,
+    /// Absent without radars, as in each question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) radars: Option<Vec<RadarMount>>,
     pub(super) camera: Option<Camera>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Ego {
     pub(super) length_m: f64,
     pub(super) width_m: f64,
 }
 
-#[derive(Deserialize)]
-pub(super) struct Road {
-    pub(super) lanes: u32,
-    pub(super) lane_width_m: f64,
-    pub(super) curvature_per_m: f64,
-    pub(super) speed_limit_mps: f64,
-    pub(super) overtaking_side: Side,
-}
-
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Lidar {
     pub(super) name: String,
     pub(super) x_m: f64,
@@ -50,26 +48,12 @@ pub(super) struct Lidar {
     pub(super) azimuth_rad: f64,
     pub(super) half_field_rad: f64,
     pub(super) range_m: f64,
-    pub(super) layers: u32,
-    pub(super) columns: u32,
+    pub(super) layers: usize,
+    pub(super) columns: usize,
     pub(super) period_s: f64,
 }
 
-#[derive(Deserialize)]
-pub(super) struct Radar {
-    pub(super) side: Side,
-    pub(super) x_m: f64,
-    pub(super) y_m: f64,
-    pub(super) azimuth_rad: f64,
-    pub(super) half_field_rad: f64,
-    pub(super) range_m: f64,
-    pub(super) period_s: f64,
-    pub(super) range_sd_m: f64,
-    pub(super) azimuth_sd_rad: f64,
-    pub(super) radial_sd_mps: f64,
-}
-
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Camera {
     pub(super) x_m: f64,
     pub(super) z_m: f64,
@@ -78,82 +62,72 @@ pub(super) struct Camera {
     pub(super) focal_px: f64,
     pub(super) distortion_k1: f64,
     pub(super) distortion_k2: f64,
-    pub(super) width: u32,
-    pub(super) height: u32,
+    pub(super) width: usize,
+    pub(super) height: usize,
     pub(super) period_s: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Scans {
     pub(super) time_s: f64,
     pub(super) time_ns: i64,
     pub(super) odometry: Odometry,
     pub(super) pose: Pose,
     pub(super) scans: Vec<Scan>,
-    /// Absent without radars.
-    #[serde(default)]
-    pub(super) radar_scans: Vec<RadarScan>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) radar_scans: Option<Vec<RadarScan>>,
     pub(super) image: Option<Image>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Odometry {
     pub(super) speed_mps: f64,
     pub(super) acceleration_mps2: f64,
     pub(super) yaw_rate_radps: f64,
-    pub(super) lane: u32,
+    pub(super) lane: u8,
     pub(super) lane_offset_m: f64,
 }
 
-#[derive(Deserialize)]
-pub(super) struct Pose {
-    pub(super) x_m: f64,
-    pub(super) y_m: f64,
-    pub(super) yaw_rad: f64,
-}
-
-#[derive(Deserialize)]
+/// A scan. The arrays are base64 of little-endian numbers.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Scan {
     pub(super) sensor: String,
     pub(super) start_ns: i64,
     pub(super) end_ns: i64,
     pub(super) mirror_side: Option<MirrorSide>,
-    points: usize,
-    x_m: String,
-    y_m: String,
-    z_m: String,
-    intensity: String,
-    beam: String,
-    offset_ns: String,
+    pub(super) points: usize,
+    pub(super) x_m: String,
+    pub(super) y_m: String,
+    pub(super) z_m: String,
+    pub(super) intensity: String,
+    pub(super) echo_pulse_width_ns: String,
+    pub(super) beam: String,
+    pub(super) offset_ns: String,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum MirrorSide {
-    Plus,
-    Minus,
-}
-
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct RadarScan {
     pub(super) side: Side,
     pub(super) time_ns: i64,
     pub(super) detections: Vec<RadarDetection>,
 }
 
-#[derive(Deserialize)]
+/// A detection of a radar, also in the form of `controllers/include/closecall_perception.h`.
+#[repr(C)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct RadarDetection {
     pub(super) range_m: f64,
     pub(super) azimuth_rad: f64,
     pub(super) radial_mps: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct Image {
     pub(super) time_ns: i64,
     pub(super) width: u32,
     pub(super) height: u32,
-    rgb: String,
+    /// Base64 of the bytes.
+    pub(super) rgb: String,
 }
 
 /// The arrays of a scan, all of the same length.
@@ -218,6 +192,7 @@ mod tests {
             y_m: numbers.clone(),
             z_m: numbers.clone(),
             intensity: numbers.clone(),
+            echo_pulse_width_ns: numbers.clone(),
             beam: beams,
             offset_ns: numbers,
         }
