@@ -1,16 +1,17 @@
 //! Whether the ego slows down because of the vehicles behind it.
 //!
 //! An ego that is always slower has a longer gap ahead, and prevents collisions without looking
-//! back. Such an ego also slows down if nobody is behind. In scenarios with the requirement `MIS-9`,
-//! some samples therefore run again without the vehicles that start behind the ego, while nothing
-//! happens ahead. If the ego slows down in such a run by more than the baseline does, it misses the
-//! requirement. The time at which it begins to slow down does not matter.
+//! back. Such an ego also slows down if nobody is behind, or if the vehicles behind it do not
+//! approach. In scenarios with the requirement `MIS-9`, some samples therefore run twice more, while
+//! nothing happens ahead: without the vehicles that start behind the ego, and with these vehicles at
+//! no more than the speed of the ego. If the ego slows down in such a run by more than the baseline
+//! does, it misses the requirement. The time at which it begins to slow down does not matter.
 
 use closecall_simulation::RunKey;
 use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::interval::lower_bound;
 
-use crate::record::NobodyBehind;
+use crate::record::NobodyComing;
 use crate::validity::CheckPlan;
 
 /// The requirement that the system does not slow the ego unless a vehicle behind is the reason.
@@ -27,40 +28,40 @@ const MOST: f64 = 0.05;
 /// Confidence of the bound on that share.
 const CONFIDENCE: f64 = 0.95;
 
-/// Returns true if a sample of a scenario with these requirements runs again without the vehicles
+/// Returns true if a sample of a scenario with these requirements runs again with nobody coming from
 /// behind.
 pub(crate) fn includes(requirements: &[String], key: RunKey) -> bool {
     CheckPlan::new(SHARE, CheckPlan::AT_MOST).is_ok_and(|plan| plan.includes(key))
         && requirements.iter().any(|mark| mark == REQUIREMENT)
 }
 
-/// The runs without the vehicles behind, of the arm under test.
+/// The runs in which nobody comes from behind, of the arm under test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Attribution {
-    /// Number of runs.
+    /// Number of samples that ran again.
     pub runs: u64,
-    /// Number of runs in which the ego slowed down, or its controller failed.
+    /// Number of them in which the ego slowed down, or its controller failed.
     pub slowed: u64,
     /// The largest amount by which the ego was slower than its lead vehicle (m/s).
     pub most_mps: f64,
 }
 
 impl Attribution {
-    /// Adds a run, beside the run of the baseline if there is a baseline.
-    pub fn push(&mut self, run: NobodyBehind, baseline: Option<NobodyBehind>) {
+    /// Adds a sample, beside the sample of the baseline if there is a baseline.
+    pub fn push(&mut self, run: NobodyComing, baseline: Option<NobodyComing>) {
         self.runs += 1;
         self.slowed += u64::from(run.is_slowed(baseline));
         self.most_mps = self.most_mps.max(run.deficit_mps.unwrap_or(0.0));
     }
 
-    /// Adds the runs of another scenario.
+    /// Adds the samples of another scenario.
     pub fn add(&mut self, other: &Self) {
         self.runs += other.runs;
         self.slowed += other.slowed;
         self.most_mps = self.most_mps.max(other.most_mps);
     }
 
-    /// Returns true if the ego slows down without a vehicle behind in too many runs: the one-sided
+    /// Returns true if the ego slows down with nobody coming in too many samples: the one-sided
     /// lower bound of their share is above the allowed share.
     pub fn is_missed(&self) -> bool {
         lower_bound(self.slowed, self.runs, CONFIDENCE) > MOST
@@ -70,7 +71,7 @@ impl Attribution {
     pub fn sentence(&self) -> String {
         let Self { runs, slowed, most_mps } = self;
         format!(
-            "without the vehicles behind it, the ego still slows down by up to {most_mps:.1} m/s, or its controller fails, in {slowed} of \
+            "if no vehicle behind it approaches, the ego still slows down by up to {most_mps:.1} m/s, or its controller fails, in {slowed} of \
              {runs} checked samples (at most {} of all allowed): what it prevents is no answer to them",
             percent(MOST)
         )
@@ -84,7 +85,7 @@ mod tests {
     fn after(slowed: u64, runs: u64) -> Attribution {
         let mut attribution = Attribution::default();
         for run in 0..runs {
-            attribution.push(NobodyBehind { deficit_mps: Some(if run < slowed { 8.0 } else { 0.1 }) }, None);
+            attribution.push(NobodyComing { deficit_mps: Some(if run < slowed { 8.0 } else { 0.1 }) }, None);
         }
         attribution
     }
@@ -101,15 +102,15 @@ mod tests {
     #[test]
     fn a_controller_that_fails_without_a_vehicle_behind_is_no_better() {
         let mut attribution = Attribution::default();
-        let failed = NobodyBehind { deficit_mps: None };
+        let failed = NobodyComing { deficit_mps: None };
         (0..2).for_each(|_| attribution.push(failed, Some(failed)));
         assert!(attribution.is_missed());
     }
 
     #[test]
     fn what_the_baseline_does_as_well_is_not_held_against_the_system() {
-        let [as_baseline, more] = [3.2, 3.6].map(|deficit_mps| NobodyBehind { deficit_mps: Some(deficit_mps) });
-        let baseline = Some(NobodyBehind { deficit_mps: Some(3.0) });
+        let [as_baseline, more] = [3.2, 3.6].map(|deficit_mps| NobodyComing { deficit_mps: Some(deficit_mps) });
+        let baseline = Some(NobodyComing { deficit_mps: Some(3.0) });
         assert!(!as_baseline.is_slowed(baseline) && as_baseline.is_slowed(None));
         assert!(more.is_slowed(baseline));
     }

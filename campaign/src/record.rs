@@ -34,15 +34,21 @@ pub struct Flaky {
     pub first: SampleFailure,
 }
 
-/// What the ego does in the same sample without the vehicles behind it, while nothing happens ahead.
+/// What the ego does in the same sample without the vehicles behind it, and with vehicles behind it
+/// that do not approach, while nothing happens ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct NobodyBehind {
-    /// The largest amount by which the ego was slower than its lead vehicle (m/s); `None` if that
-    /// run ended in an error.
+pub struct NobodyComing {
+    /// The largest amount by which the ego was slower than its lead vehicle in either run (m/s);
+    /// `None` if one of them ended in an error.
     pub deficit_mps: Option<f64>,
 }
 
-impl NobodyBehind {
+impl NobodyComing {
+    /// Returns the worse of two runs.
+    pub(crate) fn worse(self, other: Self) -> Self {
+        Self { deficit_mps: self.deficit_mps.zip(other.deficit_mps).map(|(one, another)| one.max(another)) }
+    }
+
     /// Returns true if the ego slowed down by more than it does with the baseline, or its controller
     /// failed.
     pub fn is_slowed(self, baseline: Option<Self>) -> bool {
@@ -61,9 +67,9 @@ pub struct ArmRecord {
     /// The findings of the validity checks; `None` if this sample was not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checks: Option<ArmChecks>,
-    /// The run without the vehicles behind; `None` if this sample was not chosen for it.
+    /// The runs in which nobody comes from behind; `None` if this sample was not chosen for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nobody_behind: Option<NobodyBehind>,
+    pub nobody_behind: Option<NobodyComing>,
     /// The crashes before this outcome, if a repeated run has it (`--retry-crashed`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flaky: Option<Flaky>,

@@ -109,7 +109,7 @@ impl Work {
         if let (Ok(run), Ok(outcome), true) = (&run, done.record.result.clone(), is_checked || is_attributed) {
             on_outcome(&done);
             done.record.checks = is_checked.then(|| run.check(&outcome));
-            done.record.nobody_behind = is_attributed.then(|| run.with_nobody_behind()).flatten();
+            done.record.nobody_behind = is_attributed.then(|| run.with_nobody_coming()).flatten();
             done.check_s = started.elapsed().as_secs_f64() - wall_s;
         }
         done

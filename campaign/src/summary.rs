@@ -34,7 +34,7 @@ pub struct Counts {
     pub invalid: u64,
     /// The findings of the validity checks.
     pub checks: CheckCounts,
-    /// The runs of the arm under test without the vehicles behind.
+    /// The runs of the arm under test in which nobody comes from behind.
     pub attribution: Attribution,
     /// Simulated time of all runs (s).
     pub simulated_s: f64,

@@ -1,6 +1,7 @@
 //! Variations of a scenario: those that must not change its outcome, which the validity checks run,
-//! and the one in which nobody comes from behind.
+//! and those in which nobody comes from behind.
 
+use closecall_controllers::{CheckedDriver, HumanDriver, Prescribed};
 use closecall_sensors::lidar::ClusteringCheck;
 use closecall_traffic::{Road, Time, VehicleState};
 
@@ -44,6 +45,27 @@ impl Scenario {
         let staying = self.actors.iter().zip(&stays).filter(|(_, stays)| **stays);
         let actors = staying.map(|(actor, _)| Actor { events: Vec::new(), ..actor.clone() }).collect();
         Some(Self { actors, ego, ..self.clone() })
+    }
+
+    /// Returns the same scenario in which the vehicles that start behind the ego, in any lane, keep
+    /// their lane and a constant speed, at most the speed of the ego at the start. The others have no
+    /// events: somebody is behind, nobody approaches, and nothing happens ahead. Returns `None` if
+    /// nobody is behind.
+    pub fn with_nobody_approaching(&self) -> Option<Self> {
+        let ego = self.actors[self.ego].start;
+        let is_behind = |actor: &Actor| actor.start.s_m < ego.s_m;
+        let changed = |actor: &Actor| {
+            let mut actor = Actor { events: Vec::new(), ..actor.clone() };
+            if is_behind(&actor) {
+                let speed_mps = actor.start.speed_mps.min(ego.speed_mps);
+                actor.driver = CheckedDriver::Human(HumanDriver::Prescribed(Prescribed::constant(speed_mps)));
+                (actor.path, actor.speed_keeping) = (None, None);
+                actor.start = VehicleState { speed_mps, acceleration_mps2: 0.0, ..actor.start };
+            }
+            actor
+        };
+        let actors = self.actors.iter().map(changed).collect();
+        self.actors.iter().any(is_behind).then(|| Self { actors, ..self.clone() })
     }
 
     /// Returns the mirror image, in which left and right are swapped. Returns `None` on a curved
@@ -141,6 +163,22 @@ mod tests {
         let reversed = scenario.reversed().with_nobody_behind().unwrap();
         assert_eq!((names(&reversed), reversed.ego), (vec!["front".to_owned(), "ego".to_owned()], 1));
         assert!(alone.with_nobody_behind().is_none());
+    }
+
+    #[test]
+    fn with_nobody_approaching_the_vehicles_behind_are_no_faster_than_the_ego() {
+        let scenario = headline();
+        let kept = scenario.with_nobody_approaching().unwrap();
+        let speeds_mps =
+            |scenario: &Scenario| scenario.actors.iter().map(|actor| actor.start.speed_mps).collect::<Vec<_>>();
+        let [before, after] = [&scenario, &kept].map(speeds_mps);
+        assert!(before[2] > before[0] + 2.0);
+        assert_eq!(after, [before[0], before[1], before[0]]);
+        assert_eq!((kept.ego, kept.actors.len()), (scenario.ego, 3));
+        assert!(kept.actors.iter().all(|actor| actor.events.is_empty()));
+        assert_eq!(kept.actors[0].driver, scenario.actors[0].driver);
+        assert_ne!(kept.actors[2].driver, scenario.actors[2].driver);
+        assert!(scenario.with_nobody_behind().unwrap().with_nobody_approaching().is_none());
     }
 
     #[test]

@@ -10,7 +10,7 @@ use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 
 use super::mirror::is_mirror_image;
 use super::{ArmChecks, Invariance};
-use crate::record::NobodyBehind;
+use crate::record::NobodyComing;
 use crate::runner::run_guarded;
 
 /// One sample in one arm, to be checked.
@@ -36,13 +36,16 @@ impl CheckedRun<'_> {
         self.check_with(ClusteringCheck::default(), outcome)
     }
 
-    /// Runs this sample without the vehicles behind the ego. `None` if nobody is behind, if the run
-    /// took too long, or if nothing was measured in it.
-    pub(crate) fn with_nobody_behind(&self) -> Option<NobodyBehind> {
-        match self.run(&self.scenario.with_nobody_behind()?, self.arm) {
-            Ok(outcome) => outcome.cost.map(|cost| NobodyBehind { deficit_mps: Some(cost.unprompted_deficit_mps) }),
-            Err(error) => (!error.is_late()).then_some(NobodyBehind { deficit_mps: None }),
-        }
+    /// Runs this sample without the vehicles behind the ego, and with vehicles behind that do not
+    /// approach. `None` if nobody is behind, if both runs took too long, or if nothing was measured
+    /// in them.
+    pub(crate) fn with_nobody_coming(&self) -> Option<NobodyComing> {
+        let changed = [self.scenario.with_nobody_behind()?, self.scenario.with_nobody_approaching()?];
+        let measured = changed.iter().filter_map(|scenario| match self.run(scenario, self.arm) {
+            Ok(outcome) => outcome.cost.map(|cost| NobodyComing { deficit_mps: Some(cost.unprompted_deficit_mps) }),
+            Err(error) => (!error.is_late()).then_some(NobodyComing { deficit_mps: None }),
+        });
+        measured.reduce(NobodyComing::worse)
     }
 
     fn check_with(&self, clustering: ClusteringCheck, outcome: &Outcome) -> ArmChecks {

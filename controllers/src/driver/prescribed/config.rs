@@ -161,6 +161,11 @@ fn check_pairs(
 }
 
 impl Prescribed {
+    /// Returns a driver that keeps its lane and this speed (m/s).
+    pub fn constant(speed_mps: f64) -> Self {
+        Self { points: Points::Speeds(SpeedProfile::new(vec![(0.0, speed_mps)])), lane_changes: Vec::new() }
+    }
+
     /// Returns the speeds of a vehicle that drives at `start_mps` at time zero.
     pub(super) fn speeds_from(&self, start_mps: f64) -> SpeedProfile {
         match &self.points {
