@@ -7,6 +7,10 @@ use closecall_traffic::{Road, Time, VehicleState};
 
 use super::{Actor, Event, Scenario, Trigger};
 
+/// Distance within which the nearest vehicle behind starts that does not approach (m): a choice. Every
+/// rear sensor sees it, and it follows at 2 s at 30 m/s.
+const NEAR_M: f64 = 60.0;
+
 impl Scenario {
     /// Returns the same scenario with half the step of the vehicle dynamics and the human drivers.
     /// The rates of the sensors and of the ego controller do not change, since they are properties
@@ -48,19 +52,22 @@ impl Scenario {
     }
 
     /// Returns the same scenario in which the vehicles that start behind the ego, in any lane, keep
-    /// their lane and a constant speed, at most the speed of the ego at the start. The others have no
-    /// events: somebody is behind, nobody approaches, and nothing happens ahead. Returns `None` if
-    /// nobody is behind.
+    /// their lane and a constant speed, at most the speed of the ego at the start. They start so near
+    /// that the ego can see one. The others have no events: somebody is behind, nobody approaches, and
+    /// nothing happens ahead. Returns `None` if nobody is behind.
     pub fn with_nobody_approaching(&self) -> Option<Self> {
         let ego = self.actors[self.ego].start;
         let is_behind = |actor: &Actor| actor.start.s_m < ego.s_m;
+        let behind_m = self.actors.iter().filter(|actor| is_behind(actor)).map(|actor| ego.s_m - actor.start.s_m);
+        let nearer_m = (behind_m.fold(f64::INFINITY, f64::min) - NEAR_M).max(0.0);
         let changed = |actor: &Actor| {
             let mut actor = Actor { events: Vec::new(), ..actor.clone() };
             if is_behind(&actor) {
                 let speed_mps = actor.start.speed_mps.min(ego.speed_mps);
                 actor.driver = CheckedDriver::Human(HumanDriver::Prescribed(Prescribed::constant(speed_mps)));
                 (actor.path, actor.speed_keeping) = (None, None);
-                actor.start = VehicleState { speed_mps, acceleration_mps2: 0.0, ..actor.start };
+                let s_m = actor.start.s_m + nearer_m;
+                actor.start = VehicleState { s_m, speed_mps, acceleration_mps2: 0.0, ..actor.start };
             }
             actor
         };
@@ -175,6 +182,8 @@ mod tests {
         assert!(before[2] > before[0] + 2.0);
         assert_eq!(after, [before[0], before[1], before[0]]);
         assert_eq!((kept.ego, kept.actors.len()), (scenario.ego, 3));
+        let behind_m = |scenario: &Scenario| scenario.actors[0].start.s_m - scenario.actors[2].start.s_m;
+        assert!(behind_m(&scenario) > 100.0 && (behind_m(&kept) - NEAR_M).abs() < 1e-9);
         assert!(kept.actors.iter().all(|actor| actor.events.is_empty()));
         assert_eq!(kept.actors[0].driver, scenario.actors[0].driver);
         assert_ne!(kept.actors[2].driver, scenario.actors[2].driver);
