@@ -83,7 +83,7 @@ fn each_fault_of_a_library_costs_its_sample_and_leaves_no_process() {
         ("negative-variance", "`tracks[0].covariance[1][1]` must be a variance"),
         ("status", "`tracks[0].status` must be \"tentative\", \"confirmed\" or \"coasting\", it is 9"),
         ("class", "`tracks[0].class.car` must be a number from 0 to 1, it is 3"),
-        ("twice", "`tracks[1].id` must be another number"),
+        ("twice", "`tracks[1].id` must be a number that no other track of the answer has"),
         ("unset", "`tracks[0].covariance[0][0]` must be a variance"),
         ("many", "the library answered 257 tracks; there is room for 256"),
     ];

@@ -86,10 +86,7 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
             writeln!(answers, "{controller}: {:.3} µs per control step", 1e6 * step_s)
                 .map_err(|error| error.to_string())
         }
-        ["probe-perception", path] => {
-            let text = serde_json::to_string(&probe_library(Path::new(path))).map_err(|error| error.to_string())?;
-            writeln!(answers, "{text}").map_err(|error| error.to_string())
-        }
+        ["probe-perception", path] => probe_library(Path::new(path), answers),
         ["perceive", path] => serve_library(Path::new(path), requests, answers),
         // Loading it runs its code.
         ["onnxruntime", library] => {

@@ -30,12 +30,19 @@ use crate::controller::native::Probe;
 use crate::perception::answer::ERROR_KEY;
 use crate::perception::message::Message;
 
-/// Loads a library in this process, and returns what it is.
-pub fn probe(path: &Path) -> Probe {
-    match Library::load(path) {
+/// Loads a library in this process, and writes a line to `answers` that says what it is. The library
+/// is unloaded afterwards.
+///
+/// # Errors
+/// The message of the failure.
+pub fn probe(path: &Path, mut answers: impl Write) -> Result<(), String> {
+    let loaded = Library::load(path);
+    let probe = match &loaded {
         Ok(library) => Probe::Identity(library.identity().clone()),
         Err(error) => Probe::Refused { reason: error.to_string(), is_io: error.is_io() },
-    }
+    };
+    let text = serde_json::to_string(&probe).map_err(|error| error.to_string())?;
+    writeln!(answers, "{text}").and_then(|()| answers.flush()).map_err(|error| error.to_string())
 }
 
 /// Loads a library in this process, and answers every message of `requests` with a line to `answers`, until there are no more.
