@@ -209,7 +209,7 @@ FAULTS = {
     "hang": "hangs: no answer in twice the 500 ms allowed",
     "leak": "holds more than the 256 MiB of memory allowed",
     "many": "the perception answered: `tracks` must be a list of at most 256",
-    "twice": "`tracks[1].id` must be another number",
+    "twice": "`tracks[1].id` must be a number that no other track of the answer has",
     "nan": "the perception answered: `tracks[0].covariance[2][1]` must be a number, it is NaN",
     "infinite": "`tracks[0].vx_mps` must be a number from -150 to 150, it is -inf",
     "size": "`tracks[0].covariance` must be a list of 4 lists of 4 numbers",

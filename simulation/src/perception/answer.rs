@@ -492,7 +492,7 @@ mod tests {
             refused(Kind::Tracks, change, stated);
         }
         let twice = answer(Kind::Tracks, &format!("{TRACK},{TRACK}")).unwrap_err();
-        assert!(twice.contains("`tracks[1].id` must be another number"), "{twice}");
+        assert!(twice.contains("`tracks[1].id` must be a number that no other track of the answer has"), "{twice}");
     }
 
     #[test]
