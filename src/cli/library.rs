@@ -137,7 +137,7 @@ impl<'a> Overview<'a> {
 mod tests {
     use super::*;
 
-    /// Columns and rows of a terminal, of which the prompt takes one.
+    /// Columns and rows of a terminal. The prompt takes one row.
     const TERMINAL: [usize; 2] = [80, 24];
 
     #[test]
