@@ -27,9 +27,13 @@ use super::start;
 /// Interval at which the memory of the process is checked while its answer is awaited.
 const MEMORY_CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Time that a process has to end by itself once its standard input is closed or its standard
-/// output has ended.
+/// Time that a process has to end by itself once its standard input is closed, and its last output
+/// to arrive.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
+
+/// Time that a process has to end once its standard output has ended, until it counts as one that
+/// closed its output and goes on. A process may end slowly where many share the processors.
+const CLOSED_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Interval at which a process is polled for its end.
 const EXIT_POLL_INTERVAL: Duration = Duration::from_millis(1);
@@ -389,7 +393,7 @@ impl Child {
 
     /// Returns why standard output has ended: with the process, or before it.
     fn exit_error(&mut self) -> ExecError {
-        let (has_ended, answered) = (self.ends_within(EXIT_TIMEOUT), self.answered);
+        let (has_ended, answered) = (self.ends_within(CLOSED_TIMEOUT), self.answered);
         let status = self.reap();
         // What the process wrote before its end may still be in the pipe: wait until it is read.
         let _ = self.stderr_end.recv_timeout(EXIT_TIMEOUT);
