@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::support::{ROOT, all_of_library, traffic_of_library};
+use crate::support::{ROOT, all_of_library, families_of_library, traffic_of_library};
 
 #[path = "../../xtask/src/write_evidence/mod.rs"]
 #[expect(dead_code, reason = "the program's entry is not called")]
@@ -73,12 +73,14 @@ fn the_committed_sections_have_the_form_that_the_program_writes() {
 #[test]
 fn every_scenario_of_the_library_is_in_the_tables() {
     let tables = committed(Section::Scenarios);
-    let mut names = names(&all_of_library());
-    names.extend(self::names(&traffic_of_library()));
+    let (judged, agreement) = tables.split_once("### Agreement of the sensor modes").unwrap();
+    let (scenarios, others) = judged.split_once("### Other functions").unwrap();
+    let [aeb, acc, recorded, anchor, ramp] = families_of_library();
+    let names: Vec<String> =
+        [all_of_library(), recorded, ramp, traffic_of_library()].iter().flat_map(|paths| names(paths)).collect();
     let expected = names
         .iter()
         .flat_map(|name| ["mis", "mis-extended", "gap-1.6"].map(|arm| vec![format!("`{name}`"), format!("`{arm}`")]));
-    let (scenarios, agreement) = tables.split_once("### Agreement of the sensor modes").unwrap();
     let listed = rows(scenarios);
     assert_eq!(listed.iter().map(|row| row[..2].to_vec()).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
     for row in &listed {
@@ -86,6 +88,15 @@ fn every_scenario_of_the_library_is_in_the_tables() {
         let count = |index: usize| row[index].parse::<u64>().unwrap();
         assert_eq!(count(3), count(5) + count(9), "without = prevented + both: {row:?}");
     }
+    let others: Vec<Vec<String>> = rows(others).iter().map(|row| row[..2].to_vec()).collect();
+    let others_expected: Vec<Vec<String>> = [acc, aeb]
+        .iter()
+        .flat_map(|paths| self::names(paths))
+        .map(|name| vec![format!("`{name}`"), "`acc+aeb`".to_owned()])
+        .collect();
+    assert_eq!(others, others_expected);
+    let anchor = self::names(&anchor);
+    assert!(!anchor.is_empty() && anchor.iter().all(|name| committed(Section::Anchor).contains(name)), "{anchor:?}");
     let agreement = rows(agreement);
     assert_eq!(
         agreement.iter().map(|row| row[0].clone()).collect::<Vec<_>>(),

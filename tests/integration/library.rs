@@ -43,7 +43,7 @@ fn check_does_not_call_a_scenario_valid_that_is_not() {
 
 #[test]
 fn every_parameter_is_fitted_or_assumed() {
-    for path in all_of_library().into_iter().chain(families_of_library()) {
+    for path in all_of_library().into_iter().chain(families_of_library().into_iter().flatten()) {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         for (name, entry) in file.space().iter() {
             match &entry.provenance {
@@ -58,7 +58,7 @@ fn every_parameter_is_fitted_or_assumed() {
 #[test]
 fn every_scenario_names_a_requirement_of_the_list() {
     let list = include_str!("../../docs/reference/requirements.md");
-    for path in all_of_library().into_iter().chain(families_of_library()) {
+    for path in all_of_library().into_iter().chain(families_of_library().into_iter().flatten()) {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         let requirements = &file.config().requirements;
         assert!(!requirements.is_empty(), "{}", path.display());
@@ -75,7 +75,7 @@ fn fitted_distributions_equal_those_of_the_committed_fit() {
     let tables: Vec<ParametersConfig> =
         ["parameters", "parametric"].map(|table| document[table].clone().try_into().unwrap()).into();
     let mut count = 0;
-    for path in all_of_library().into_iter().chain(families_of_library()) {
+    for path in all_of_library().into_iter().chain(families_of_library().into_iter().flatten()) {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         for (name, config) in &file.config().parameters.0 {
             if config.fitted.is_none() {

@@ -26,13 +26,10 @@ pub(crate) fn traffic_of_library() -> Vec<PathBuf> {
     scenarios_in(&library_folder().join("traffic"))
 }
 
-/// Returns the scenarios of the library in separate folders: the scenarios of other functions, those
-/// with a ramp, and the headline as recorded.
-pub(crate) fn families_of_library() -> Vec<PathBuf> {
-    ["aeb", "acc", "as-recorded", "anchor", "ramp"]
-        .iter()
-        .flat_map(|name| scenarios_in(&library_folder().join(name)))
-        .collect()
+/// Returns the scenarios of the library in separate folders, folder by folder: emergency braking,
+/// cruise control, the headline as recorded, emergency braking beside a human driver, and ramps.
+pub(crate) fn families_of_library() -> [Vec<PathBuf>; 5] {
+    ["aeb", "acc", "as-recorded", "anchor", "ramp"].map(|name| scenarios_in(&library_folder().join(name)))
 }
 
 fn scenarios_in(folder: &Path) -> Vec<PathBuf> {

@@ -82,8 +82,8 @@ impl Section {
     fn rests_on(self, scenario: &str) -> bool {
         let is_headline = scenario == "low-thw-overtake";
         match self {
-            // Their tables have the scenarios of the library's folder, and those with traffic.
-            Self::Scenarios | Self::Ensemble => !scenario.contains('/') || scenario.starts_with("traffic/"),
+            Self::Scenarios => super::scenarios::have(scenario) || super::scenarios::have_as_other_function(scenario),
+            Self::Ensemble => super::scenarios::have(scenario),
             Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
             Self::Twins => super::rows::TWINS.contains(&scenario),
             Self::EventFree => super::rows::rests_without_event_on(scenario),

@@ -33,11 +33,37 @@ const ARMS: [(&str, &str); 4] = [
 /// directly ahead.
 const NO_ANTICIPATION: &str = "anticipation-none";
 
+/// The folders of scenarios that judge the margin increase system. Faults have a page of their own.
+const FOLDERS: [&str; 4] = ["", "as-recorded", "ramp", TRAFFIC];
+
+/// The folder of the scenarios with surrounding traffic, which take longer.
+const TRAFFIC: &str = "traffic";
+
+/// The folders of scenarios that judge another function. Emergency braking beside a human driver has
+/// a page of its own.
+const OTHER_FUNCTIONS: [&str; 2] = ["acc", "aeb"];
+
+/// Returns true if the tables have a scenario, by its path below the folder of the library.
+pub(super) fn have(scenario: &str) -> bool {
+    FOLDERS.contains(&scenario.rsplit_once('/').map_or("", |(folder, _)| folder))
+}
+
+/// Returns true if the table of the other functions has a scenario, by its path below the folder of
+/// the library.
+pub(super) fn have_as_other_function(scenario: &str) -> bool {
+    scenario.split_once('/').is_some_and(|(folder, _)| OTHER_FUNCTIONS.contains(&folder))
+}
+
 /// A scenario of the library, with the number of samples that its table rests on.
 struct Entry {
     file: ScenarioFile,
     samples: u64,
 }
+
+/// The head of a table of pairs of arms.
+const COLUMNS: &str = "\n| scenario | arm | samples | collisions without | with | prevented | share of those without | \
+                       induced | share of all | both | harm prevented | harm induced | largest speed deficit (m/s) |\n\
+                       |---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
 
 /// Returns the description of the table of a section.
 fn head(sentence: &str) -> String {
@@ -57,17 +83,25 @@ pub(super) fn library(size: Size) -> Result<String, Box<dyn Error>> {
         "{samples} samples of each scenario with seed {seed} and `full` sensors; {member_samples} of each scenario with \
          surrounding traffic; one of a scenario in which nothing varies."
     ));
-    text.push_str(
-        "\n| scenario | arm | samples | collisions without | with | prevented | share of those without | induced | share of \
-         all | both | harm prevented | harm induced | largest speed deficit (m/s) |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
-    );
+    text.push_str(COLUMNS);
     let library = entries(size)?;
     let arms = ARMS.map(|(name, _)| name);
     for Entry { file, samples } in &library {
         let size = Size { samples: *samples, ..size };
         let name = file.config().name.clone();
         text.push_str(&rows_of(&name, *samples, &run(vec![file.clone()], size, Some(SensorMode::Full), &arms)?)?);
+    }
+    text.push_str(
+        "\n### Other functions\n\nScenarios that judge emergency braking or cruise control. Each is compared with the same stack \
+         without the function.\n",
+    );
+    text.push_str(COLUMNS);
+    for path in OTHER_FUNCTIONS.map(files_of).into_iter().collect::<Result<Vec<_>, _>>()?.concat() {
+        let file = ScenarioFile::load(&path, &[])?;
+        let arms = ControllerChoice::of_function(file.config().function).map(|arm| arm.to_string());
+        let arms = arms.each_ref().map(String::as_str);
+        let name = file.config().name.clone();
+        text.push_str(&rows_of(&name, samples, &run(vec![file], size, Some(SensorMode::Full), &arms)?)?);
     }
     text.push_str(
         "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the first of the same \
@@ -118,11 +152,12 @@ pub(super) fn ensemble(size: Size) -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// Returns the scenarios of the library in alphabetical order; scenarios with surrounding traffic
-/// come last.
+/// Returns the scenarios that judge the margin increase system, folder by folder in alphabetical
+/// order; scenarios with surrounding traffic come last.
 fn entries(size: Size) -> Result<Vec<Entry>, Box<dyn Error>> {
     let mut entries = Vec::new();
-    for (folder, samples) in [("", size.samples), ("traffic", size.member_samples)] {
+    for folder in FOLDERS {
+        let samples = if folder == TRAFFIC { size.member_samples } else { size.samples };
         for path in files_of(folder)? {
             let file = ScenarioFile::load(&path, &[])?;
             // If nothing varies, all samples are the same.
