@@ -49,7 +49,7 @@ pub enum BeamFileError {
         /// The number of columns found.
         found: usize,
     },
-    /// A value is no number, or out of its range.
+    /// A value is not a number, or out of its range.
     #[error("column `{column}` is `{found}`, but {allowed} is needed")]
     Number {
         /// Number of the line, counted from 1.
