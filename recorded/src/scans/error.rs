@@ -98,7 +98,7 @@ pub enum ScanFileProblem {
     /// A row has too few or too many fields, or is not text.
     #[error("{0}")]
     Csv(String),
-    /// A field is no number.
+    /// A field is not a number.
     #[error("`{text}` is no finite number")]
     NotANumber {
         /// The text of the field.

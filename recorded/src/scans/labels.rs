@@ -6,12 +6,16 @@ use std::path::Path;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::error::{ScanFileError, ScanFileProblem};
-use super::text_table::read_table;
+use super::text_table::{TableFormat, read_table};
 
 /// Longest time between two labels of a vehicle between which it is interpolated (s).
 const LONGEST_GAP: Time = Time::from_ms(500);
-/// The columns of a table of labels. All are needed.
-const COLUMNS: [&str; 9] = ["time_s", "id", "class", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m"];
+/// A table of labels.
+const FORMAT: TableFormat = TableFormat {
+    columns: &["time_s", "id", "class", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m"],
+    needed: 9,
+    gives: "the labels",
+};
 
 /// A vehicle at one time, in the ego's frame at that time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +49,7 @@ impl Labels {
     /// # Errors
     /// [`ScanFileError`] with the line and the column that is wrong.
     pub fn read(path: &Path) -> Result<Self, ScanFileError> {
-        let rows = read_table(path, &COLUMNS, (COLUMNS.len(), "the labels"))?;
+        let rows = read_table(path, FORMAT)?;
         let mut vehicles: BTreeMap<String, Vec<Label>> = BTreeMap::new();
         for row in &rows {
             let id = row.needed_text(1)?;
