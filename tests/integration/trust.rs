@@ -191,7 +191,7 @@ fn a_pipe_in_place_of_a_file_is_not_sound_and_its_removal_is_the_repair() {
         fs::remove_file(&path).unwrap();
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
         let listed = problems(&out, 3);
-        assert!(listed.contains(&format!("{name}: it is a named pipe, a socket or a device, and no file")), "{listed}");
+        assert!(listed.contains(&format!("{name}: it is a named pipe, a socket or a device, not a file")), "{listed}");
         assert!(listed.contains("repair: remove it, then resume the campaign: "), "{listed}");
         assert_eq!(code(&campaign(&out, &["--resume"])), 6);
         fs::remove_file(&path).unwrap();
