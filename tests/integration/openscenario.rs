@@ -473,7 +473,7 @@ fn the_distributions_that_closecall_exports_come_back_as_distributions() {
         ),
         (
             "<ProbabilityDistributionSet><Element value=\"full\" weight=\"1\"/></ProbabilityDistributionSet>",
-            "`ProbabilityDistributionSet`: `brake-mps2`: `full` is no number",
+            "`ProbabilityDistributionSet`: `brake-mps2`: `full` is not a number",
         ),
     ] {
         let start = "<StochasticDistribution parameterName=\"brake_mps2\">";
@@ -671,7 +671,7 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
             "RelativeTargetLane entityRef=\"Ego\" value=\"4\"",
             &["RelativeTargetLane", "only -1, -2"],
         ),
-        ("<LaneChangeAction>", "<LaneOffsetAction continuous=\"false\">", &["it is no XML document"]),
+        ("<LaneChangeAction>", "<LaneOffsetAction continuous=\"false\">", &["it is not an XML document"]),
         ("TimeHeadwayCondition", "OffroadCondition", &["OffroadCondition", "not read"]),
         (
             "storyboardElementRef=\"cut-in\"",
@@ -891,7 +891,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
     let faults: [(&str, &str, &str); 33] = [
-        ("<OpenDRIVE>", "<OpenStreet>", "it is no XML"),
+        ("<OpenDRIVE>", "<OpenStreet>", "it is not an XML"),
         ("</OpenDRIVE>", "", "ends before its root element"),
         ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
         ("id=\"1\"", "id=\"2\"", "no road `1`"),

@@ -12,7 +12,7 @@ use crate::external::error::LoadError;
 const MAX_LISTED: usize = 12;
 
 /// Returns the platform of this program.
-pub(crate) fn this_platform() -> String {
+fn this_platform() -> String {
     format!("{ARCH} {OS}")
 }
 
