@@ -415,7 +415,7 @@ fn an_unfinished_campaign_does_not_displace_finished_results() {
     let kept = content(&previous);
     let output = sized(folder.path(), "6", &["--record", "worst:1"]);
     stdout(&output, 0);
-    let said = "the campaign in closecall-results has not come to its end: it is replaced, and \
+    let said = "the campaign in closecall-results is unfinished: it is replaced, and \
                 closecall-results.previous keeps the last finished results";
     assert!(message(&output).contains(said), "{}", stderr(&output));
     assert!(!message(&output).contains("the last results are now in"), "{}", stderr(&output));
@@ -543,7 +543,7 @@ fn view_without_arguments_names_the_last_report_and_what_is_missing() {
     assert_eq!(report, "closecall-results/report.html");
     assert!(!recordings.is_empty() && recordings.lines().all(|file| folder.path().join(file).is_file()), "{files}");
     fs::remove_file(folder.path().join(RESULTS).join("report.html")).unwrap();
-    assert!(message(&view(&[])).contains("has not come to its end"), "{}", stderr(&view(&[])));
+    assert!(message(&view(&[])).contains("its campaign is unfinished"), "{}", stderr(&view(&[])));
 }
 
 #[test]
