@@ -40,13 +40,20 @@ pub(crate) fn lib(path: &Path) -> String {
     format!("lib:{}", path.display())
 }
 
-/// The fault that a process shows: see `faulty.c`.
+/// Runs a command whose controller shows a fault of `faulty.c`.
 pub(crate) fn with_fault(command: &mut Command, fault: Option<&str>) -> Output {
     match fault {
         Some(fault) => command.env("FAULT", fault),
         None => command,
     };
     command.output().unwrap()
+}
+
+/// Runs one sample with a controller that shows a fault in this sample.
+fn run_with_fault(controller: &str, fault: &str) -> Output {
+    let mut command = program();
+    command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", controller]);
+    with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
 }
 
 const SAMPLES: &str = "24";
@@ -327,11 +334,7 @@ fn an_error_stays_one_until_it_is_tried_again() {
 fn a_crash_in_a_single_run_is_an_error_and_what_a_library_prints_is_no_answer() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
-    let run = |fault| {
-        let mut command = program();
-        command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", &library]);
-        with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
-    };
+    let run = |fault| run_with_fault(&library, fault);
     let output = run("segfault");
     assert_eq!(code(&output), 5, "{}", stderr(&output));
     assert!(message(&output).contains("signal: 11 (SIGSEGV)"), "{}", stderr(&output));
@@ -353,11 +356,7 @@ fn a_crash_in_a_single_run_is_an_error_and_what_a_library_prints_is_no_answer() 
 fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_library_is_unloaded_is_none() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
-    let run = |fault| {
-        let mut command = program();
-        command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", &library]);
-        with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
-    };
+    let run = |fault| run_with_fault(&library, fault);
     for (fault, expected) in [
         ("frees", "the controller ended its process (signal: 6 (SIGABRT)); it last wrote: freed twice"),
         ("frees-never", "the process hangs: no answer in twice the 1000 ms allowed"),
