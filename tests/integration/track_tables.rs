@@ -76,9 +76,9 @@ fn the_documented_query_gives_the_consistency_that_the_tracker_s_own_tests_compu
     let output = Command::new(python).args(["-c", &script]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let printed = String::from_utf8(output.stdout).unwrap();
-    let found: Vec<f64> = printed.split_whitespace().map(|word| word.parse().unwrap()).collect();
-    assert_eq!(found.len(), expected.len(), "{printed}");
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found / expected - 1.0).abs() < 1e-6, "{printed}: {expected}");
+    let computed: Vec<f64> = printed.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    assert_eq!(computed.len(), expected.len(), "{printed}");
+    for (computed, expected) in computed.iter().zip(expected) {
+        assert!((computed / expected - 1.0).abs() < 1e-6, "{printed}: {expected}");
     }
 }

@@ -54,8 +54,8 @@ impl Labels {
         for row in &rows {
             let id = row.needed_text(1)?;
             let class = row.needed_text(2)?;
-            let class = VehicleClass::ALL.into_iter().find(|known| known.name() == class).ok_or_else(|| {
-                let names = VehicleClass::ALL.map(|known| format!("`{}`", known.name())).join(", ");
+            let class = VehicleClass::ALL.into_iter().find(|candidate| candidate.name() == class).ok_or_else(|| {
+                let names = VehicleClass::ALL.map(|candidate| format!("`{}`", candidate.name())).join(", ");
                 row.place(2).error(ScanFileProblem::UnknownWord { text: class.to_owned(), allowed: names })
             })?;
             let size = |column: usize| match row.number(column)? {

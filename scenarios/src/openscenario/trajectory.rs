@@ -267,8 +267,8 @@ mod tests {
             .map(|step| f64::from(step) * 0.1)
             .map(|t| point(t, 30.0 * t, -1.75 - 3.5 * path(((t - 4.0) / 6.0).clamp(0.0, 1.0))))
             .collect();
-        let found = changes(&points, &[-1.75, -5.25]).unwrap();
-        let [change] = found[..] else { panic!("{found:?}") };
+        let detected = changes(&points, &[-1.75, -5.25]).unwrap();
+        let [change] = detected[..] else { panic!("{detected:?}") };
         assert_eq!((change.from, change.to), (0, 1));
         assert!((change.at_s - 4.0).abs() < 0.05 && (change.duration_s - 6.0).abs() < 0.05, "{change:?}");
         let broken_off: Vec<_> = points.iter().copied().take(75).collect();
