@@ -215,7 +215,7 @@ fn a_trajectory_becomes_speeds_and_lane_changes() {
         (TIMING, &[(0.0, -2, 170.0), (1.0, -2, 160.0)], "-10.00 m/s"),
         (TIMING, &[(0.0, -2, 170.0), (0.0, -2, 190.0)], "`time` must grow"),
         (TIMING, &[(0.0, -2, 170.0)], "two vertices"),
-        (TIMING, &[(0.0, -2, 170.0), (1.0, -3, 190.0)], "lane -3 is no driving lane"),
+        (TIMING, &[(0.0, -2, 170.0), (1.0, -3, 190.0)], "lane -3 is not a driving lane"),
         (&never, &points, "one of absolute, relative"),
         (&absolute, &points, "begins at 0.00 s, and its event at 3.0"),
     ];
