@@ -291,7 +291,7 @@ fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names(
         ("", "", &["--value-set", "0"], "from 1 to 2"),
         ("\"Gap\"", "\"Gab\"", first, "there is no parameter `Gab`"),
         ("value=\"60\"", "value=\"wide\"", first, "`Gap`, whose value is given from outside: `value` is `wide`"),
-        ("value=\"60\"", "worth=\"60\"", first, "`worth` is no attribute"),
+        ("value=\"60\"", "worth=\"60\"", first, "`worth` is not an attribute"),
         ("case.xosc", "cases.xosc", first, "values.xosc:2: `ScenarioFile`: failed to read"),
         ("case.xosc", "values.xosc", first, "must name a scenario"),
         ("</OpenSCENARIO>", "<Storyboard/></OpenSCENARIO>", first, "`Storyboard`: a file of values has nothing beside"),
@@ -719,8 +719,8 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
 /// and the words that the message must have.
 fn faults_of_attributes() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
     vec![
-        ("<Event name=", "<Event colour=\"red\" name=", &["`Event`", "`colour` is no attribute", "name, priority"]),
-        ("<Init>", "<Init speed=\"3\">", &["`Init`", "`speed` is no attribute of it, which can have none"]),
+        ("<Event name=", "<Event colour=\"red\" name=", &["`Event`", "`colour` is not an attribute", "name, priority"]),
+        ("<Init>", "<Init speed=\"3\">", &["`Init`", "`speed` is not an attribute of it, which can have none"]),
         ("<Init>", "<Init/><Init>", &["`Init`", "`Storyboard` has one already"]),
         ("<Storyboard>", "<Storyboard>now", &["`Storyboard`", "`now`", "no text is allowed"]),
         ("priority=\"parallel\"", "priority=\"foo\"", &["`Event`", "`foo`", "overwrite, override, parallel, skip"]),

@@ -99,7 +99,7 @@ pub enum ScanFileProblem {
     #[error("{0}")]
     Csv(String),
     /// A field is not a number.
-    #[error("`{text}` is no finite number")]
+    #[error("`{text}` is not a finite number")]
     NotANumber {
         /// The text of the field.
         text: String,

@@ -261,7 +261,7 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
         return Err(reader.error(header, message));
     }
     match root.child("Catalog") {
-        Some(catalog) => Err(reader.error(catalog, "a catalogue is no scenario")),
+        Some(catalog) => Err(reader.error(catalog, "a catalogue is not a scenario")),
         None => Ok(()),
     }
 }

@@ -1,10 +1,10 @@
-//! The pattern of a LiDAR that scans no raster, as a table of the directions and times of its
+//! The pattern of a LiDAR that does not scan a raster, as a table of the directions and times of its
 //! beams.
 //!
 //! ```text
 //!   azimuth_deg,elevation_deg,time_offset_us        azimuth: to the sensor's left as it looks, about its axis
 //!   -12.40,0.35,0.0                                 elevation: upward
-//!   3.15,-1.20,10.0                                 time: after the begin of the scan
+//!   3.15,-1.20,10.0                                 time: after the beginning of the scan
 //! ```
 //!
 //! Each beam becomes a column of one layer, in the order of the azimuths; beams of the same azimuth
@@ -131,7 +131,7 @@ pub(super) struct BeamTable {
     pub(super) azimuths_deg: Vec<f64>,
     /// Elevation of each beam (deg).
     pub(super) elevations_deg: Vec<f64>,
-    /// Time of measurement of each beam after the begin of the scan (ns).
+    /// Time of measurement of each beam after the beginning of the scan (ns).
     pub(super) offsets_ns: Vec<u32>,
 }
 
@@ -172,7 +172,7 @@ impl BeamTable {
         [fold(f64::INFINITY, f64::min), fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// Returns the time of the last beam after the begin of the scan (ns).
+    /// Returns the time of the last beam after the beginning of the scan (ns).
     pub(super) fn duration_ns(&self) -> u32 {
         self.offsets_ns.iter().copied().max().unwrap_or(0)
     }
@@ -185,7 +185,7 @@ impl BeamTable {
         [low, self.azimuths_deg.len() - high]
     }
 
-    /// Returns the mean time of the beams near an azimuth after the begin of the scan (s). Where
+    /// Returns the mean time of the beams near an azimuth after the beginning of the scan (s). Where
     /// there are none, returns the mean time of all beams.
     pub(super) fn mean_offset_s(&self, azimuth_deg: f64) -> f64 {
         let end = |limit_deg: f64| self.azimuths_deg.partition_point(|beam_deg| *beam_deg < limit_deg);
