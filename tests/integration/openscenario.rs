@@ -306,7 +306,7 @@ fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names(
         assert!(!output.exists(), "{wrong}");
     }
     let refused = imported(&folder.path().join("case.xosc"), &output, &["--value-set", "1"]);
-    assert!(message(&refused).contains("no file of values"), "{}", message(&refused));
+    assert!(message(&refused).contains("not a file of values"), "{}", message(&refused));
 }
 
 /// Returns a file of distributions for the scenario `case.xosc`.
@@ -896,7 +896,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
         ("id=\"1\"", "id=\"2\"", "no road `1`"),
         ("id=\"1\"", "", "no road `1`"),
-        ("<planView>", "<planView><planView>", "no XML"),
+        ("<planView>", "<planView><planView>", "not an XML"),
         ("planView", "plan", "no `planView`"),
         ("curvature=\"0.001\"", "", "needs `curvature`"),
         ("curvature=\"0.001\"", "curvature=\"round\"", "`curvature` is `round`"),
@@ -905,7 +905,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("lanes>", "ways>", "no `lanes`"),
         ("laneSection", "section", "no `laneSection`"),
         ("right>", "left>", "no lanes on the right"),
-        ("type=\"driving\"", "type=\"walking\"", "no driving lane"),
+        ("type=\"driving\"", "type=\"walking\"", "not a driving lane"),
         ("id=\"-1\"", "id=\"one\"", "`id` is `one`"),
         ("a=\"3.5\"", "", "needs `a`"),
         ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
@@ -933,7 +933,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
             | "no `lanes`"
             | "no `laneSection`"
             | "no lanes on the right"
-            | "no driving lane"
+            | "not a driving lane"
             | "`a` is 35; a lane" => ROAD.replace(right, wrong),
             _ => ROAD.replacen(right, wrong, 1),
         };
@@ -942,7 +942,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         assert_eq!(code(&refused), 3, "{wrong}: {said}");
         assert!(said.contains(word), "{wrong}: {word}: {said}");
         // A position that names no road or no lane is an error of the scenario.
-        let is_of_scenario = word.starts_with("no road") || word == "no driving lane";
+        let is_of_scenario = word.starts_with("no road") || word == "not a driving lane";
         assert!(said.contains(if is_of_scenario { "case.xosc:42: `LanePosition`" } else { "road.xodr:" }), "{said}");
         assert!(!output.exists(), "{wrong}");
     }
