@@ -10,7 +10,7 @@ use crate::native_controllers::{compile, lib};
 use crate::support::{code, folder, message, program, stderr, stdout};
 
 /// A controller that says that it runs, in a file beside it.
-const TELLING: &str = r#"#!/bin/sh
+pub(crate) const TELLING: &str = r#"#!/bin/sh
 echo ran >> "$(dirname "$0")/ran"
 echo '{"type":"hello","protocol":1,"name":"telling","version":"1"}'
 read -r line

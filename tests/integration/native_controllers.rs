@@ -93,6 +93,28 @@ pub(crate) fn is_as_baseline(record: &Record) -> bool {
     named_as(tested, baseline).has_same_bits(baseline)
 }
 
+/// Returns true if a record is of a sample in which `faulty.c` shows its fault: the ego is fast.
+pub(crate) fn has_fast_ego(record: &Record) -> bool {
+    let baseline = record.arms[0].result.as_ref().unwrap();
+    serde_json::to_value(&baseline.parameters).unwrap()["cruise-mps"].as_f64().unwrap() >= 32.7
+}
+
+/// Asserts that a fault costs the samples with a fast ego, with the expected message, and no others.
+pub(crate) fn assert_costs_fast_samples(records: &[Record], fault: &str, expected: &str) {
+    let mut failed = 0;
+    for record in records {
+        let is_fast = has_fast_ego(record);
+        match &record.arms[1].result {
+            Ok(_) => assert!(!is_fast && is_as_baseline(record), "{fault}: sample {}", record.sample),
+            Err(failure) => {
+                assert!(is_fast && failure.message.contains(expected), "{fault}: {}", failure.message);
+                failed += 1;
+            }
+        }
+    }
+    assert!(failed > 1, "{fault} shows in {failed} samples");
+}
+
 /// The library of the example in Rust, which `cargo test` builds.
 fn rust_example() -> PathBuf {
     let examples = Path::new(env!("CARGO_BIN_EXE_closecall")).with_file_name("examples");
@@ -172,20 +194,7 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
             records.iter().map(|record| record.arms.iter().map(|arm| arm.result.clone()).collect::<Vec<_>>()).collect()
         };
         assert!(shown(&results[0]) == shown(&results[1]), "{fault}");
-        let mut failed = 0;
-        for record in &results[0] {
-            let baseline = record.arms[0].result.as_ref().unwrap();
-            let values = serde_json::to_value(&baseline.parameters).unwrap();
-            let is_fast = values["cruise-mps"].as_f64().unwrap() >= 32.7;
-            match &record.arms[1].result {
-                Ok(_) => assert!(!is_fast && is_as_baseline(record), "{fault}: sample {}", record.sample),
-                Err(failure) => {
-                    assert!(is_fast && failure.message.contains(expected), "{fault}: {}", failure.message);
-                    failed += 1;
-                }
-            }
-        }
-        assert!(failed > 1, "{fault} shows in {failed} samples");
+        assert_costs_fast_samples(&results[0], fault, expected);
     }
     let mut command = program();
     command.args([

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::support::{code, folder, journal, json, json_file, library, message, program, stderr, stdout};
+use crate::support::{
+    code, folder, journal, json, json_file, library, message, program, stderr, stdout, wait_for_results,
+};
 
 const RESULTS: &str = "closecall-results";
 const PREVIOUS: &str = "closecall-results.previous";
@@ -313,13 +315,7 @@ fn start(folder: &Path, more: &[&str]) -> std::process::Child {
     let mut command = program();
     command.current_dir(folder).args(endless).args(more);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let journal = folder.join(RESULTS).join("journal.jsonl");
-    let started = Instant::now();
-    while fs::metadata(&journal).map_or(0, |journal| journal.len()) < 10_000 {
-        assert!(child.try_wait().unwrap().is_none(), "the campaign ended too early");
-        assert!(started.elapsed() < Duration::from_secs(300), "the campaign hangs");
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    wait_for_results(&mut child, &folder.join(RESULTS).join("journal.jsonl"));
     child
 }
 
