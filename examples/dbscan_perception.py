@@ -1,4 +1,4 @@
-"""A perception of one's own as an external process: DBSCAN of scikit-learn, and a filter with constant velocity.
+"""Your own perception as an external process: DBSCAN of scikit-learn, and a filter with constant velocity.
 
 Use it with --set 'sensors.perception="exec:python3 examples/dbscan_perception.py"' and sensors of mode `full`.
 docs/reference/perception.md describes the messages. Needs NumPy, SciPy and scikit-learn.

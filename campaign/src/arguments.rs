@@ -29,7 +29,7 @@ macro_rules! checked_numbers {
 
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                // A text keeps its quotes, and is no number.
+                // A text keeps its quotes, and is not a number.
                 Value::deserialize(deserializer)?.to_string().parse().map_err(D::Error::custom)
             }
         }

@@ -26,13 +26,13 @@ use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
-pub const BASELINE_VERSION: u32 = 3;
+const BASELINE_VERSION: u32 = 3;
 
 /// The results of a campaign that a repository keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
-    /// Version of the layout: [`BASELINE_VERSION`].
+    /// Version of the layout of the file.
     pub schema_version: u32,
     /// Version of the program that ran the campaign.
     pub closecall_version: String,
@@ -130,8 +130,7 @@ impl Baseline {
     /// Reads a file that [`Baseline::write`] has written.
     ///
     /// # Errors
-    /// [`FolderError`] if the file cannot be read, is not a baseline of version
-    /// [`BASELINE_VERSION`], or was edited.
+    /// [`FolderError`] if the file cannot be read, has another version of the layout, or was edited.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         let text = read_text(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
         let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };

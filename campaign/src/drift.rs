@@ -81,7 +81,7 @@ impl FittedParameter {
         Ok(summary.map(|summary| Self { name: name.to_owned(), quantity, cut, summary }))
     }
 
-    /// Returns whether another parameter has the same values, or more of them.
+    /// Returns true if another parameter has all values of this one.
     fn is_part_of(&self, other: &Self) -> bool {
         self.quantity == other.quantity && (other.cut.is_none() || self.cut == other.cut)
     }
@@ -107,8 +107,8 @@ impl Fitted {
         for (name, config) in &parameters.0 {
             all.extend(FittedParameter::of(name.as_str(), config)?);
         }
-        // In the order of the quantities. Of one quantity, parameters without a cut come first, and
-        // of these the one with its name.
+        // Within a quantity, parameters without a cut come first. Among these, the parameter that has
+        // the name of the quantity comes first.
         all.sort_by_key(|parameter| {
             (parameter.quantity, parameter.cut.is_some(), parameter.name != parameter.quantity.name())
         });
@@ -189,8 +189,16 @@ pub fn drift(fitted: &Fitted, data_sets: &[TrajectoryData], seed: u64) -> Drift 
     drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &p_value)
 }
 
-/// Returns the probability of a distance larger than the distance of these sorted new values.
+/// A function that returns the probability of a distance larger than the distance of these sorted new
+/// values.
 type PValue<'a> = dyn Fn(&str, &Summary, &[f64]) -> f64 + 'a;
+
+/// The result of one test.
+#[derive(Clone, Copy)]
+struct TestResult {
+    distance: f64,
+    p_value: f64,
+}
 
 fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PValue<'_>) -> Drift {
     let sorted = |parameter: &FittedParameter| {
@@ -200,16 +208,16 @@ fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PV
         values
     };
     let new: Vec<Vec<f64>> = fitted.0.iter().map(sorted).collect();
-    let compared = fitted.0.iter().zip(&new).map(|(parameter, new)| {
-        (new.len() >= MIN_VALUES)
-            .then(|| (parameter.summary.distance(new), p_value(&parameter.name, &parameter.summary, new)))
+    let tests = fitted.0.iter().zip(&new).map(|(FittedParameter { name, summary, .. }, new)| {
+        let test = || TestResult { distance: summary.distance(new), p_value: p_value(name, summary, new) };
+        (new.len() >= MIN_VALUES).then(test)
     });
-    let compared: Vec<Option<(f64, f64)>> = compared.collect();
-    let p_values: Vec<f64> = compared.iter().flatten().map(|(_, p_value)| *p_value).collect();
+    let tests: Vec<Option<TestResult>> = tests.collect();
+    let p_values: Vec<f64> = tests.iter().flatten().map(|test| test.p_value).collect();
     let level = LEVEL / p_values.len().max(1) as f64;
     let mut corrected = holm::corrected(&p_values).into_iter();
     let mut quantities = Vec::new();
-    for ((parameter, new), test) in fitted.0.iter().zip(&new).zip(&compared) {
+    for ((parameter, new), test) in fitted.0.iter().zip(&new).zip(&tests) {
         let summary = &parameter.summary;
         let shift = summary.distance_of_shift(|value| value * (1.0 + STATED_SHIFT));
         let needed = |distance| two_sample::needed(level, summary.n(), distance);
@@ -222,11 +230,11 @@ fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PV
             fitted_median: summary.median(),
             n: new.len(),
             median: (!new.is_empty()).then(|| quantile(new, 0.5)),
-            distance: test.map(|(distance, _)| distance),
-            p_value: test.map(|(_, p_value)| p_value),
+            distance: test.map(|test| test.distance),
+            p_value: test.map(|test| test.p_value),
             corrected_p_value: test.and_then(|_| corrected.next()),
             found_from: test.map(|_| two_sample::critical_distance(level, summary.n(), new.len())),
-            needed: test.and_then(|(distance, _)| needed(distance)),
+            needed: test.and_then(|test| needed(test.distance)),
             needed_for_five_percent: needed(shift),
         });
     }

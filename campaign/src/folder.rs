@@ -407,7 +407,8 @@ impl Iterator for Records {
             None | Some(Ok(Entry::Torn { is_tail: true, .. })) => {
                 let (has, missing) = (self.line as u64, self.plan.missing());
                 let is_missing = self.must_be_complete && missing > 0;
-                is_missing.then(|| Err(FolderError::Incomplete { path: self.path.clone(), has, of: has + missing }))
+                is_missing
+                    .then(|| Err(FolderError::Incomplete { path: self.path.clone(), has, planned: has + missing }))
             }
         };
         // What follows a wrong line cannot be trusted.

@@ -10,7 +10,7 @@ use crate::partition::Partition;
 /// Largest number of differences that a message lists.
 const MOST_DIFFERENCES: usize = 12;
 
-/// Returns differences, one per line, and how many more there are.
+/// Lists differences, one per line. A last line counts those that are left out.
 pub fn listed(differences: &[String]) -> String {
     let mut lines = differences.iter().take(MOST_DIFFERENCES).cloned().collect::<Vec<_>>();
     if let Some(more) = differences.len().checked_sub(MOST_DIFFERENCES).filter(|more| *more > 0) {
@@ -60,9 +60,10 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
-    /// The folder holds the weighted runs of a rare event, which no command takes for independent samples.
+    /// The folder holds the weighted runs of a rare event. No command treats them as independent
+    /// samples.
     #[error(
-        "failed to use {}: it holds a campaign that samples a rare event; its runs are weighted and no independent samples: its result is \
+        "failed to use {}: it holds a campaign that samples a rare event; its runs are weighted and not independent samples: its result is \
          in {}",
         path.display(),
         path.join(crate::rare::RESULT).display()
@@ -71,7 +72,7 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
-    /// Something that no campaign has put there is where results belong.
+    /// Something that is not the result of a campaign lies where results belong.
     #[error("failed to use {}: {reason}; nothing is overwritten, moved or removed", path.display())]
     Foreign {
         /// The path.
@@ -88,7 +89,7 @@ pub enum FolderError {
         holder: String,
     },
     /// The folder holds one part of a campaign.
-    #[error("failed to use {}: it holds part {part} of its campaign, and a part says nothing about all; merge the parts first", path.display())]
+    #[error("failed to use {}: it holds only part {part} of its campaign; merge the parts first", path.display())]
     Part {
         /// The folder.
         path: PathBuf,
@@ -97,17 +98,16 @@ pub enum FolderError {
     },
     /// Samples of the plan are missing in the journal.
     #[error(
-        "failed to use {}: it has {has} of the {of} samples of its campaign, and a part of them says nothing about all; \
-         resume it first",
+        "failed to use {}: it has {has} of the {planned} samples of its campaign; resume it first",
         path.display()
     )]
     Incomplete {
         /// The journal.
         path: PathBuf,
-        /// Number of samples that it has.
+        /// Number of samples in the journal.
         has: u64,
         /// Number of samples of the plan.
-        of: u64,
+        planned: u64,
     },
     /// A file of the folder is damaged, or does not belong to the campaign.
     #[error("failed to read {}:{line}: {message}", path.display())]

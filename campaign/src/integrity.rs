@@ -71,7 +71,7 @@ impl Integrity {
         for name in [JOURNAL, AHEAD, WALL_TIMES, LOCK] {
             if let Some(kind) = kind_of_no_file(&folder.file(name)) {
                 let repair = format!("remove it, then {}", integrity.resumption);
-                integrity.add(name, None, format!("it is {kind}, and no file"), repair);
+                integrity.add(name, None, format!("it is {kind}, not a file"), repair);
             }
         }
         if !integrity.is_sound() {

@@ -34,13 +34,13 @@ pub struct ProbabilityGate {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GateError {
     /// The probability is not between 0 and 1.
-    #[error("{value} is no probability that could be shown: a number above 0 and below 1 is needed")]
+    #[error("{value} is not a probability that can be shown: a number above 0 and below 1 is needed")]
     Probability {
         /// The given value.
         value: f64,
     },
     /// The confidence is not between ½ and 1.
-    #[error("{value} is no confidence: a number above 0.5 and below 1 is needed")]
+    #[error("{value} is not a confidence: a number above 0.5 and below 1 is needed")]
     Confidence {
         /// The given value.
         value: f64,

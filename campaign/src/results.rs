@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A new campaign takes the place of the last one, whose folder becomes the previous one. A
-//! campaign that has not come to its end becomes the previous one only if no finished one would
+//! unfinished campaign becomes the previous one only if no finished one would
 //! make way for it: otherwise it is replaced itself. A folder
 //! is moved or removed only if its manifest says that a campaign has made it here on its own
 //! account, and if it holds only files of a campaign. Everything else at one of the two paths is
@@ -65,7 +65,7 @@ pub struct Moved {
     pub has_removed: bool,
 }
 
-/// Results of a campaign that has not come to its end, in the way of a new one. They are removed.
+/// Results of an unfinished campaign, in the way of a new one. They are removed.
 #[derive(Clone, Copy, Debug)]
 pub struct Unfinished<'a> {
     /// The folder in which they are.

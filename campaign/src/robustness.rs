@@ -58,9 +58,10 @@ pub fn robustness(
     }
     let (mut each, mut all): (Vec<Robustness>, Option<Robustness>) = (Vec::new(), None);
     for FileStudy { study, .. } in &studies {
-        let cases = Study::cases(setup);
-        // The results are in the order of the cases for any number of threads.
-        let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
+        let experiments = Study::experiments(setup);
+        // The results are in the order of the experiments for any number of threads.
+        let results: Vec<Vec<CriterionCounts>> =
+            experiments.par_iter().map(|experiment| study.run(experiment)).collect();
         let result = study.robustness(setup, &results);
         let fits = all.as_mut().is_none_or(|all| all.add(&result));
         if !fits {

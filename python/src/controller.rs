@@ -271,12 +271,12 @@ fn parse(answer: &Bound<'_, PyAny>) -> PyResult<(f64, EgoState)> {
     if let Ok(pair) = answer.cast::<PyTuple>()
         && let Ok((acceleration_mps2, state)) = pair.extract::<(f64, String)>()
     {
-        let found = serde_json::from_value(json!(state));
+        let parsed = serde_json::from_value(json!(state));
         let refused = |_| PyValueError::new_err(format!("`step` answered the state `{state}`: it is one of {STATES}"));
-        return Ok((acceleration_mps2, found.map_err(refused)?));
+        return Ok((acceleration_mps2, parsed.map_err(refused)?));
     }
-    let found = answer.get_type().name()?;
-    Err(PyTypeError::new_err(format!("`step` answered {}, a `{found}`: it must be {ANSWERS}", answer.repr()?)))
+    let type_name = answer.get_type().name()?;
+    Err(PyTypeError::new_err(format!("`step` answered {}, a `{type_name}`: it must be {ANSWERS}", answer.repr()?)))
 }
 
 /// Describes an exception: its type and message, then the traceback without them. An exception that no code of the controller has

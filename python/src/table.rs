@@ -91,9 +91,9 @@ pub(crate) fn rows_table(rows: &str) -> PyResult<Table> {
     let rows: Vec<Map<String, Value>> =
         serde_json::from_str(rows).map_err(|error| PyValueError::new_err(error.to_string()))?;
     let mut names: Vec<&String> = Vec::new();
-    let mut known = BTreeSet::new();
+    let mut names_so_far = BTreeSet::new();
     for name in rows.iter().flat_map(Map::keys) {
-        if known.insert(name) {
+        if names_so_far.insert(name) {
             names.push(name);
         }
     }

@@ -27,7 +27,7 @@ pub(crate) fn in_markdown(text: &str) -> String {
     escaped
 }
 
-/// Escapes what would start a heading, a quotation or a list at the begin of a text. Returns the
+/// Escapes what would start a heading, a quotation or a list at the beginning of a text. Returns the
 /// index of the first character that is left.
 fn block_start(text: &[char], escaped: &mut String) -> usize {
     let blanks = text.iter().take_while(|c| c.is_whitespace()).count();

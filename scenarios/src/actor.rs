@@ -34,6 +34,6 @@ pub struct Actor {
 pub(super) fn find_actor(ids: &[&ActorId], id: &ActorId, key: &str) -> Result<usize, ConfigError> {
     ids.iter().position(|actor| *actor == id).ok_or_else(|| {
         let names = ids.iter().map(|id| format!("`{id}`")).collect::<Vec<_>>().join(", ");
-        ConfigError::new(key, Problem::UnknownActor { value: id.to_string(), known: names })
+        ConfigError::new(key, Problem::UnknownActor { value: id.to_string(), allowed: names })
     })
 }

@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn a_setting_that_undoes_an_earlier_one_is_found() {
-        let found = |texts: &[&str]| {
+        let contradiction = |texts: &[&str]| {
             let settings: Vec<Setting> = texts.iter().map(|text| text.parse().unwrap()).collect();
             Setting::contradiction(&settings).map(|pair| pair.map(ToString::to_string))
         };
@@ -321,7 +321,7 @@ mod tests {
             ["brake-mps2=6", "parameters.brake-mps2.fixed=5"],
             ["acc:aeb.trigger-mps2=5", "acc:aeb.trigger-mps2=6"],
         ] {
-            let [first, second] = found(&texts).unwrap_or_else(|| panic!("{texts:?}"));
+            let [first, second] = contradiction(&texts).unwrap_or_else(|| panic!("{texts:?}"));
             assert_eq!(first, texts[0]);
             assert_eq!(second.replace(' ', ""), texts[1].replace(' ', ""));
         }
@@ -337,7 +337,7 @@ mod tests {
             ["acc:aeb.trigger-mps2=5", "acc+aeb:aeb.trigger-mps2=6"],
             ["aeb.trigger-mps2=5", "acc:aeb.trigger-mps2=6"],
         ] {
-            assert_eq!(found(&texts), None, "{texts:?}");
+            assert_eq!(contradiction(&texts), None, "{texts:?}");
         }
     }
 

@@ -98,7 +98,7 @@ impl FittedFile {
                 || Quantity::ALL.iter().any(|quantity| quantity.name() == entry)
         };
         if let Some(unknown) = self.parameters.0.keys().find(|entry| !is_known(entry.as_str())) {
-            return Err(refuse(format!("`{unknown}` is no parameter of {name}: allowed are {}", allowed())));
+            return Err(refuse(format!("`{unknown}` is not a parameter of {name}: allowed are {}", allowed())));
         }
         let replacement = |(parameter, config): (&ParameterName, &ParameterConfig)| {
             Some((parameter.clone(), self.replacement(parameter.as_str(), config)?))
@@ -274,7 +274,7 @@ mod tests {
         let entry = |name: &str| format!("[parameters]\n{name} = {{ uniform = {{ min = 1, max = 2 }} }}\n");
         let message = fitted(&entry("front-thw")).settings(&headline()).unwrap_err().to_string();
         assert!(
-            message.contains("`front-thw` is no parameter of low-thw-overtake: allowed are brake-mps2"),
+            message.contains("`front-thw` is not a parameter of low-thw-overtake: allowed are brake-mps2"),
             "{message}"
         );
         let message = fitted(&entry("crossing-mps")).settings(&headline()).unwrap_err().to_string();

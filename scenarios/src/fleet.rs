@@ -182,7 +182,7 @@ impl Looks {
     fn check(&self, class: VehicleClass) -> Result<(), String> {
         check_shares("shapes", &self.shapes.values().copied().collect::<Vec<_>>())?;
         if let Some(name) = self.shapes.keys().find(|name| shape_of(class, name).is_none()) {
-            return Err(format!("shapes: `{name}` is no shape of a {}", class.name()));
+            return Err(format!("shapes: `{name}` is not a shape of a {}", class.name()));
         }
         check_shares("paints", &self.paints.iter().map(|paint| paint.share).collect::<Vec<_>>())?;
         for Paint { colour, reflectivity: [dark, bright], .. } in &self.paints {
@@ -253,7 +253,7 @@ fn check_source(key: &str, source: &str) -> Result<(), String> {
     if source.len() > MIN_SOURCE_LEN {
         return Ok(());
     }
-    Err(format!("{key}: `{source}` is no source; more than {MIN_SOURCE_LEN} characters are needed"))
+    Err(format!("{key}: `{source}` is not a source; more than {MIN_SOURCE_LEN} characters are needed"))
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ const CERTAIN_DEATH_MPS: f64 = 71.0 * MPS_PER_MPH;
 
 /// Returns the risk that a change of velocity (m/s) kills the driver. Returns 1 for NaN, which must
 /// never look harmless.
-pub fn death_risk(delta_v_mps: f64) -> f64 {
+fn death_risk(delta_v_mps: f64) -> f64 {
     let share = delta_v_mps / CERTAIN_DEATH_MPS;
     if share < 1.0 { share.max(0.0).powi(4) } else { 1.0 }
 }

@@ -44,23 +44,24 @@ const LIBRARY: [(&str, &str); 17] = embedded![
 const TRAFFIC: [(&str, &str); 4] =
     embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic", "trucks-alongside"];
 
-/// The scenarios of the folder `as-recorded`: the headline with the distributions of the
-/// recordings, uncut.
+/// The scenarios of the folder `as-recorded`: the headline scenario with the full distributions of the
+/// recordings.
 const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtake-as-recorded"];
 
-/// The scenarios of the folders `aeb` and `acc` of the library, which judge emergency braking and
-/// adaptive cruise control.
+/// The scenarios of the folder `aeb`, which judge emergency braking.
 const AEB: [(&str, &str); 2] = embedded!["aeb": "aeb-lead-brakes", "aeb-lead-brakes-gently"];
+/// The scenarios of the folder `acc`, which judge adaptive cruise control.
 const ACC: [(&str, &str); 2] = embedded!["acc": "acc-lead-slows", "acc-slow-vehicle-ahead"];
 
-/// The scenario of the folder `anchor`: emergency braking under a human driver, held against crash records.
+/// The scenario of the folder `anchor`: emergency braking under a human driver, compared with crash
+/// records.
 const ANCHOR: [(&str, &str); 1] = embedded!["anchor": "anchor-lead-brakes"];
 
 /// The scenarios of the folder `ramp`: a vehicle merges from a ramp.
 const RAMP: [(&str, &str); 2] = embedded!["ramp": "ramp-merges", "ramp-merges-without-merge"];
 
-/// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
-/// base.
+/// The scenarios of the folder `faults`: a sensor has a fault. Each file names a base and states only
+/// the differences from it.
 const FAULTS: [(&str, &str); 82] = embedded![
     "faults":
     "camera-dead",
@@ -252,8 +253,8 @@ fn in_folder(folder: &str) -> &'static [(&'static str, &'static str)] {
     }
 }
 
-/// Returns the name of the scenario that a word names: by its name, or by its folder and its name, as
-/// `traffic/busy-overtake`.
+/// Returns the name of the scenario that a word names. The word is a name, or a folder and a name such
+/// as `traffic/busy-overtake`.
 pub fn named(word: &str) -> Option<&'static str> {
     match word.split_once('/') {
         Some((folder, name)) => in_folder(folder).iter().map(|(scenario, _)| *scenario).find(|other| *other == name),
@@ -261,7 +262,7 @@ pub fn named(word: &str) -> Option<&'static str> {
     }
 }
 
-/// Returns true if a word begins with a folder of the library, as `traffic/busy-overtake`.
+/// Returns true if a word begins with a folder of the library, such as `traffic/busy-overtake`.
 pub(crate) fn has_folder(word: &str) -> bool {
     word.split_once('/').is_some_and(|(folder, _)| !in_folder(folder).is_empty())
 }
@@ -269,7 +270,7 @@ pub(crate) fn has_folder(word: &str) -> bool {
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
     let name = named(name)?;
-    // Without the scenarios with faults, which are put together from their bases, if possible.
+    // The scenarios without a base come first: it takes time to expand the scenarios with faults.
     plain_text(name).or_else(|| all().find(|(scenario, _)| *scenario == name).map(|(_, text)| text))
 }
 

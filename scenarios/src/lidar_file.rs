@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// The pattern of a LiDAR that scans no raster.
+    /// The pattern of a LiDAR that does not scan a raster.
     const ROSETTE: &str = "name = \"rosette\"\nsource = \"a test\"\nbeams-file = \"beams.csv\"\n\
          half-field-deg = 30.0\nazimuth-step-deg = 0.2\nbeam-width-deg = 0.1\nbeam-height-deg = 0.1\n\
          layer-spacing-deg = 0.2\nrate-hz = 10.0\nrange-m = 80.0\nrange-reflectivity = 0.1\n\

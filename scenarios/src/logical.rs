@@ -151,7 +151,7 @@ fn parameters(approach: &Approach, spreads: &Spreads, headline: &ParametersConfi
 }
 
 fn parameter_name(name: &str) -> Result<ParameterName, String> {
-    ParameterName::new(name).ok_or_else(|| format!("`{name}` is no name of a parameter"))
+    ParameterName::new(name).ok_or_else(|| format!("`{name}` is not a name of a parameter"))
 }
 
 /// Returns a normal distribution around a recorded value, within bounds.

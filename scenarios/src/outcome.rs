@@ -90,7 +90,7 @@ impl Collision {
 
     /// Returns the change of velocity of `actor` (m/s), or `None` if it is not one of the two
     /// vehicles.
-    pub fn delta_v_of(&self, actor: &ActorId) -> Option<f64> {
+    fn delta_v_of(&self, actor: &ActorId) -> Option<f64> {
         let index = self.between.iter().position(|id| id == actor)?;
         Some(self.delta_v_mps[index])
     }
@@ -315,7 +315,7 @@ pub struct MisSummary {
 impl MisSummary {
     /// Returns the longest time without a break over which the stated reason held in `decided_s`, or in the run if no
     /// vehicle behind met the conditions (s). `None` if it held for no time.
-    pub fn reason_span_s(&self) -> Option<[f64; 2]> {
+    fn reason_span_s(&self) -> Option<[f64; 2]> {
         let [from_s, until_s] = self.decided_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let spans = self.reasons.iter().filter(|span| span.reason == self.reason);
         let held = spans.map(|span| [span.from_s.max(from_s), span.until_s.min(until_s)]);

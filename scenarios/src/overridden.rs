@@ -16,31 +16,31 @@ const CONFIDENCE: f64 = 0.95;
 
 /// Returns what `after` demands less than `before`.
 pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
-    let mut found = before.overridden.clone();
+    let mut weakened = before.overridden.clone();
     for (mark, asked) in &before.checks {
         let kept = after.checks.get(mark).map_or(&[][..], Vec::as_slice);
         let is_kept = |old: &Expression| kept.iter().any(|new| new.is_as_strict_as(old));
-        found.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
+        weakened.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
     }
     let is_gate_kept = |old: &&Expression| after.gate.require.iter().any(|new| new.is_as_strict_as(old));
-    found.extend(before.gate.require.iter().filter(|old| !is_gate_kept(old)).map(|old| format!("gate {old}")));
-    found.extend(weaker_probability(&before.gate, &after.gate));
+    weakened.extend(before.gate.require.iter().filter(|old| !is_gate_kept(old)).map(|old| format!("gate {old}")));
+    weakened.extend(weaker_probability(&before.gate, &after.gate));
     let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
-    found.extend(requirements.map(|mark| format!("requirement {mark}")));
+    weakened.extend(requirements.map(|mark| format!("requirement {mark}")));
     let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
-    found.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
+    weakened.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
-    found.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
+    weakened.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
     let mut asked = before.checks.values().flatten().chain(&before.gate.require);
     let asks_coverage = asked.any(|check| check.aggregate == Aggregate::Coverage);
-    found.extend((asks_coverage && before.coverage != after.coverage).then(|| "what is to be covered".to_owned()));
+    weakened.extend((asks_coverage && before.coverage != after.coverage).then(|| "what is to be covered".to_owned()));
     let observed = before.parameters.0.iter().filter(|(name, parameter)| {
         let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
         parameter.observed.is_some() && kept.is_some_and(|kept| Some(kept) != parameter.observed.as_ref())
     });
-    found.extend(observed.map(|(name, _)| format!("observed range of {name}")));
-    found
+    weakened.extend(observed.map(|(name, _)| format!("observed range of {name}")));
+    weakened
 }
 
 /// Returns the bound of the probability of a collision if `after` bounds it less, or with less

@@ -73,7 +73,7 @@ impl Variation {
             Some(key) => Ok(format!("actor.{LANE_CHANGER}.driver.wiedemann99.{key}")),
             None if parameter.contains('.') => Ok(parameter.to_owned()),
             None => Err(format!(
-                "`{parameter}` is no parameter of the lane changer's driver: allowed are {}, or a path of keys such as \
+                "`{parameter}` is not a parameter of the lane changer's driver: allowed are {}, or a path of keys such as \
                  `actor.{LANE_CHANGER}.driver.wiedemann99.cc1-s`",
                 PARAMETERS.join(", "),
             )),

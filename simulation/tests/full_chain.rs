@@ -1,6 +1,6 @@
 //! Tests of the full rear chain: the range and accuracy at which a rear vehicle is tracked.
 //!
-//! The tests use few runs; `validate_tracking`, among the examples of the workspace, gives the figures.
+//! The tests use few runs. `just xtask validate-tracking` gives the figures.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorMode, SensorsConfig, TrackAudit};

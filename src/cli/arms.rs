@@ -51,8 +51,8 @@ impl ControllerArgs {
         self.controller.is_some()
     }
 
-    /// Returns the controllers. The processes among them have the limits of the command line. Each
-    /// is tried.
+    /// Returns the controllers, after a trial of each. Those that are processes get the limits of the
+    /// command line.
     fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
         let (timeout_ms, memory_mib) = self.limits.stated();
         if let (Some(last), true) = (controllers.last(), timeout_ms.is_some() || memory_mib.is_some())
@@ -103,7 +103,7 @@ pub(super) struct ComparisonArgs {
     pub(super) paired: bool,
     /// Controllers that run on the same samples and random numbers. The first is the baseline, the
     /// last is the controller under test, and references lie between them. An `exec:COMMAND` takes
-    /// the rest of its list: let it stand last, or give --arms several times
+    /// the rest of its list: put it last, or give --arms several times
     #[arg(long, value_name = "CONTROLLER,CONTROLLER…", conflicts_with_all = ["paired", "controller"], help_heading = heading::CONTROLLER)]
     #[serde(deserialize_with = "parsed_list")]
     pub(super) arms: Vec<ArmList>,

@@ -475,7 +475,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
     ];
     if let Some((_, option)) = is_named.into_iter().find(|(is_named, _)| *is_named) {
         return Err(CliError::usage(format!(
-            "the runs of --design {method} are no independent samples of the scenario: it cannot be combined with {option}"
+            "the runs of --design {method} are not independent samples of the scenario: it cannot be combined with {option}"
         )));
     }
     if args.partition.is_some() {

@@ -66,7 +66,7 @@ const NETWORK_NEEDS: [(&str, &str); 2] = [("check", "watch"), ("compare", "searc
 
 /// The option for the shared library of ONNX Runtime.
 const ONNXRUNTIME: &str = "onnxruntime";
-/// The variable of the environment for the same.
+/// The environment variable that names the same library.
 pub(super) const ONNXRUNTIME_VARIABLE: &str = "ORT_DYLIB_PATH";
 
 /// Adds the option for the shared library of ONNX Runtime to a command.
@@ -96,8 +96,8 @@ fn onnxruntime(matches: &clap::ArgMatches) -> Option<PathBuf> {
     }
 }
 
-/// Returns why a command line that names the shared library of ONNX Runtime runs no network, if so.
-/// A variable of the environment is for all commands.
+/// Returns a message if the command line names the shared library of ONNX Runtime, but the command
+/// runs no network. The environment variable applies to all commands, so it gets no message.
 fn runs_no_network(matches: &clap::ArgMatches) -> Option<String> {
     let (command, below) = matches.subcommand()?;
     let (_, needed) = NETWORK_NEEDS.into_iter().find(|(name, _)| *name == command)?;
@@ -179,7 +179,7 @@ enum Command {
 }
 
 /// The commands that belong to a group or to another command, each with its whole name. A user may
-/// know them by their name alone.
+/// type the name without the group.
 const GROUPED: [(&str, &str); 31] = [
     ("aerial", "traffic aerial"),
     ("anchor", "study anchor"),
@@ -270,12 +270,12 @@ fn negative_number(named: &str, arguments: &[std::ffi::OsString]) -> Option<Stri
         word.strip_prefix('-')
             .is_some_and(|rest| rest.starts_with(|first: char| first.is_ascii_digit() || first == '.'))
     };
-    let at = words.iter().position(|word| word.starts_with(named) && is_number(word))?;
-    let before = words.get(at.checked_sub(1)?)?;
-    // An option that has its value already, `--seed=1`, takes no other one.
+    let index = words.iter().position(|word| word.starts_with(named) && is_number(word))?;
+    let before = words.get(index.checked_sub(1)?)?;
+    // An option that already has its value, such as `--seed=1`, takes no second one.
     let is_option = before.starts_with('-') && before.len() > 1 && !before.contains('=') && !is_number(before);
     let expected = if is_option { format!("'{before}' takes") } else { "this command takes".to_owned() };
-    Some(format!("unexpected argument '{}': {expected} no number below 0", words[at]))
+    Some(format!("unexpected argument '{}': {expected} no number below 0", words[index]))
 }
 
 /// Returns the allowed numbers, if another number is the reason for the error.
@@ -307,7 +307,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         };
         Box::new(options.build())
     };
-    // If a hook is already set, the program that uses this crate as a library has set it: it stays.
+    // A hook that is already set stays: the program that uses this crate as a library has set it.
     drop(miette::set_hook(Box::new(handler)));
     let (command, onnxruntime) = match parse(arguments) {
         Ok(parsed) => parsed,
@@ -316,7 +316,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Pass };
             let is_odd = |text: &std::ffi::OsString| matches!(shown(&text.to_string_lossy()), Cow::Owned(_));
             if arguments.iter().any(is_odd) {
-                // It may quote an argument with control characters.
+                // The message may quote an argument with control characters.
                 print_error(format_args!("{}", error.render()));
                 return code;
             }
@@ -335,7 +335,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
         print_failure(CliError::usage(message));
         return ExitCode::Usage;
     }
-    // A worker process has the backend of its task.
+    // A worker process gets its backend from its task.
     if !matches!(command, Command::Host { .. }) {
         choose_backend(onnxruntime.as_deref());
     }
@@ -354,13 +354,13 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     }
 }
 
-/// Sizes of the stacks of threads that the variable `RUST_MIN_STACK` may name (bytes). The default
-/// of Rust is 2 MiB. A run needs less than 1 MiB; that a thread for each processor fits into the
-/// address space is an assumption.
+/// Stack sizes of threads that the environment variable `RUST_MIN_STACK` may name (bytes). The default
+/// of Rust is 2 MiB. A run needs less than 1 MiB. The upper limit assumes that the address space holds
+/// one thread for each processor.
 const STACK_BYTES: std::ops::RangeInclusive<u64> = 1 << 20..=1 << 30;
 
-/// Returns the fault of the stack size that the environment asks for. Samples would overflow the
-/// stacks, or no thread could start.
+/// Returns a message if the environment asks for a stack size outside [`STACK_BYTES`]: samples would
+/// overflow a smaller stack, and no thread could start with a larger one.
 fn wrong_stack() -> Option<String> {
     let stated = std::env::var("RUST_MIN_STACK").ok()?;
     let bytes: u64 = stated.parse().ok()?;
@@ -369,7 +369,8 @@ fn wrong_stack() -> Option<String> {
         .then(|| format!("RUST_MIN_STACK={stated}: expected {least} to {most} bytes, or no such variable"))
 }
 
-/// Returns true if a command ends by itself: it serves nobody, and waits for no change of a file.
+/// Returns true if a command ends by itself. `view`, `check --watch` and a worker process go on until
+/// they are stopped.
 const fn has_end(command: &Command) -> bool {
     match command {
         Command::View(_) | Command::Host { .. } => false,

@@ -1,5 +1,5 @@
-//! `closecall campaign --fidelity MODE:FACTOR`: the samples of a campaign, and more of them, with
-//! fast sensors.
+//! `closecall campaign --fidelity MODE:FACTOR`: runs the samples of a campaign again, and more samples,
+//! with fast sensors.
 //!
 //! ```text
 //!  DIR           samples 0 … n         ─┐
@@ -7,9 +7,9 @@
 //! ```
 //!
 //! The fast samples run after the campaign, in a folder of the same form: they are resumed, divided
-//! among machines and merged like any campaign. The rates of both inform, and decide nothing. The
-//! estimate is a normal approximation whose coverage is tested, and a gate needs a bound that holds:
-//! gates judge the samples of the campaign alone.
+//! among machines and merged like any campaign. The rates that follow from both are printed, but no
+//! gate judges them. A gate needs a guaranteed bound, and the estimate is a normal approximation whose
+//! coverage is tested. Gates judge the samples of the campaign alone.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -45,7 +45,8 @@ use crate::exit_code::ExitCode;
 
 /// The modes that can be fast, the slower one first.
 const FAST_MODES: [SensorMode; 2] = [SensorMode::Object, SensorMode::GroundTruth];
-/// Smallest number of fast samples, relative to the samples of the campaign: fewer add none.
+/// Smallest number of fast samples, relative to the samples of the campaign. A factor of 1 would add
+/// no sample.
 const LEAST_FACTOR: u64 = 2;
 
 /// The fast sensors of a campaign, and the number of its fast samples.
@@ -133,7 +134,7 @@ pub(super) struct FastSamples<'a> {
     /// The cluster that runs the samples, if this machine does not.
     ray: Option<&'a str>,
     retry_errors: bool,
-    /// Their folder, with its manifest; `None` if the results are not kept.
+    /// Folder of the fast samples, with its manifest; `None` if the results are not kept.
     kept: Option<(LockedFolder, Manifest)>,
     /// Number of fast samples that are done.
     done: u64,
@@ -157,7 +158,7 @@ impl Companion for FastSamples<'_> {
         let path = folder.file(FAST_SAMPLES);
         check_file_sizes(&self.plan.campaign(), &path, false)?;
         let manifest = self.plan.manifest(session::arguments())?;
-        // The folder of the campaign is new, or its campaign goes on. So do the fast samples.
+        // The folder of the campaign is new or is resumed. The same is true of the fast samples.
         let locked = Folder::lock(&path, &manifest, true)?;
         remember_here(&locked.folder, &manifest);
         self.kept = Some((locked, manifest));
@@ -299,12 +300,12 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_fixed_number_of_independent_samples_is_refused() {
+    fn a_campaign_without_a_fixed_number_of_independent_samples_is_refused() {
         let choice: FidelityChoice = "object:20".parse().unwrap();
         let folder = Place::Named(Path::new("x"));
         choice.check(Design::Random, false, folder).unwrap();
         choice.check(Design::Random, false, Place::Default).unwrap();
-        for (design, is_sequential, place, said) in [
+        for (design, is_sequential, place, expected) in [
             (Design::Sobol, false, folder, "the design `random` draws them, and `sobol` does not"),
             (Design::Grid, false, folder, "`grid` does not"),
             (Design::Coverage, false, folder, "`coverage` does not"),
@@ -312,7 +313,7 @@ mod tests {
             (Design::Random, false, Place::Nowhere, "leave out --no-out"),
         ] {
             let error = choice.check(design, is_sequential, place).unwrap_err().to_string();
-            assert!(error.contains(said), "{said}: {error}");
+            assert!(error.contains(expected), "{expected}: {error}");
         }
     }
 }

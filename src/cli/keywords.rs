@@ -1,8 +1,9 @@
-//! The keywords of a call, from which the arguments of a command are deserialised.
+//! Turns the keywords of a call into the arguments of a command.
 //!
-//! The arguments of a command are a struct, whose fields are the options of the command line and
-//! the keywords of a call. A field that is such a struct itself has a name that begins with `..`:
-//! its keywords stand beside the others. Which arguments exclude each other is stated for clap.
+//! The arguments of a command are a struct. Its fields are the options of the command line and the
+//! keywords of a call. A field whose name begins with `..` is a struct of further arguments: the call
+//! gives their keywords beside all others. The attributes for clap say which arguments exclude each
+//! other.
 
 use std::slice::Iter;
 
@@ -15,10 +16,10 @@ use serde_json::{Map, Value};
 use super::CliError;
 use super::argument::Argument;
 
-/// The begin of a field's name whose keywords stand beside the others.
+/// The beginning of the name of a field that is a struct of further arguments.
 const GROUP: &str = "..";
 
-/// The words of serde for what is expected, and a user's words.
+/// For each expected value, the words of serde and the words for a user.
 const EXPECTED: [(&str, &str); 10] = [
     ("u64", "a whole number, 0 or more"),
     ("u32", "a whole number, 0 or more"),
@@ -31,8 +32,8 @@ const EXPECTED: [(&str, &str); 10] = [
     ("a string", "a text"),
     ("string or map", "a text"),
 ];
-/// The words of serde for the value that is there, and a user's words. A word that a value follows
-/// is left out.
+/// For each given value, the words of serde and the words for a user. A word before a quoted value is
+/// left out.
 const GIVEN: [(&str, &str); 9] = [
     ("integer ", ""),
     ("floating point ", ""),
@@ -45,8 +46,8 @@ const GIVEN: [(&str, &str); 9] = [
     ("sequence", "a list"),
 ];
 
-/// Returns a message of serde in the words of a user: which value is not allowed, and what is
-/// expected.
+/// Returns a message of serde in words for a user: it names the value that is not allowed, and the
+/// expected value.
 fn plain(message: &str) -> String {
     if let Some(unknown) = message.strip_prefix("unknown variant ") {
         return unknown.to_owned();
@@ -63,7 +64,7 @@ fn plain(message: &str) -> String {
     }
 }
 
-/// Returns the arguments of a command that the keywords, a JSON object, state.
+/// Returns the arguments of a command from its keywords, which are a JSON object.
 pub(super) fn arguments<T: Args + DeserializeOwned>(keywords: &str) -> Result<T, CliError> {
     let refused = |error: serde_json::Error| CliError::usage(error.to_string());
     let mut keywords: Map<String, Value> = serde_json::from_str(keywords).map_err(refused)?;
@@ -88,7 +89,7 @@ fn check_conflicts<T: Args>(keywords: &Map<String, Value>) -> Result<(), CliErro
     Ok(())
 }
 
-/// Deserialises a struct from the keywords that it has, and removes them.
+/// Deserialises a struct from its keywords, and removes these keywords from the map.
 struct Group<'a>(&'a mut Map<String, Value>);
 
 impl<'de> Deserializer<'de> for Group<'_> {
@@ -100,7 +101,7 @@ impl<'de> Deserializer<'de> for Group<'_> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Self::Error> {
-        visitor.visit_map(Fields { keywords: self.0, left: fields.iter(), field: "" })
+        visitor.visit_map(Fields { keywords: self.0, rest: fields.iter(), field: "" })
     }
 
     fn deserialize_any<V: Visitor<'de>>(self, _: V) -> Result<V::Value, Self::Error> {
@@ -116,7 +117,7 @@ impl<'de> Deserializer<'de> for Group<'_> {
 /// The fields of a struct that the keywords give.
 struct Fields<'a> {
     keywords: &'a mut Map<String, Value>,
-    left: Iter<'static, &'static str>,
+    rest: Iter<'static, &'static str>,
     field: &'static str,
 }
 
@@ -125,7 +126,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
 
     fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Self::Error> {
         let is_given = |field: &&&str| field.starts_with(GROUP) || self.keywords.contains_key(**field);
-        let Some(field) = self.left.by_ref().find(is_given) else { return Ok(None) };
+        let Some(field) = self.rest.by_ref().find(is_given) else { return Ok(None) };
         self.field = field;
         let name: StrDeserializer<'_, Self::Error> = field.into_deserializer();
         seed.deserialize(name).map(Some)
@@ -144,7 +145,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
 /// The name of an argument, and whether it is given.
 type Given = (&'static str, bool);
 
-/// Refuses an argument without the one that it needs.
+/// Refuses an argument that needs another one, if that one is missing.
 pub(super) fn needs((name, is_given): Given, (needed, needed_is_given): Given) -> Result<(), CliError> {
     match is_given && !needed_is_given {
         true => Err(CliError::usage(format!("{} needs {}", Argument(name), Argument(needed)))),

@@ -71,7 +71,7 @@ fn merge_rare(args: &MergeArgs, parts: &RareParts) -> Result<ExitCode, CliError>
     ];
     if let Some((_, option)) = is_named.into_iter().find(|(is_named, _)| *is_named) {
         return Err(CliError::usage(format!(
-            "the runs of a rare event are no independent samples of the scenario: their parts cannot be merged with {option}"
+            "the runs of a rare event are not independent samples of the scenario: their parts cannot be merged with {option}"
         )));
     }
     let (gate, manifest) = (args.gates.probability()?, parts.manifest());

@@ -84,15 +84,15 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
     let wanted = Wanted { track: args.track, number: None, lead: Lead::Required };
-    let found = chosen(&args.file, &args.read, wanted)?;
-    let source = format!("{} (track {})", args.file.display(), found.change.track_id);
-    let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
+    let encounter = chosen(&args.file, &args.read, wanted)?;
+    let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
+    let file = scenario_of(&encounter, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.sim.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.sim.arm.arm(file.config().function)?, &args.watch)?;
-    let recorded = film_encounter(&found, args.watch.record_level.into())?;
-    let comparison = EncounterComparison::new(&found, &recorded, &simulated);
-    let foreword = comparison.markdown(&found, &simulated, args.rear.into());
+    let recorded = film_encounter(&encounter, args.watch.record_level.into())?;
+    let comparison = EncounterComparison::new(&encounter, &recorded, &simulated);
+    let foreword = comparison.markdown(&encounter, &simulated, args.rear.into());
     let films = [recorded.with_foreword(foreword), simulated].map(|film| film.with_plots_of_first(PROTAGONISTS));
     if let Some(path) = &args.watch.record {
         write_recording(path, &films)?;
@@ -102,7 +102,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
         write_file(path, |written| written.write_all(made_by(&args.file, &file).as_bytes()))?;
         print_written(path);
     }
-    let reenactment = Reenactment { encounter: &found, comparison: &comparison, films: &films, outcome: &outcome };
+    let reenactment = Reenactment { encounter: &encounter, comparison: &comparison, films: &films, outcome: &outcome };
     match args.format {
         Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
         Format::Human => print_text(reenactment),
@@ -144,10 +144,10 @@ pub(super) fn chosen_by<T>(
     wanted: Wanted,
     accept: impl Fn(RecordedEncounter) -> Result<T, CliError>,
 ) -> Result<Result<T, CliError>, CliError> {
-    let found = choose_first(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP, accept);
+    let encounter = choose_first(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP, accept);
     let track = wanted.track;
     let file = path.display();
-    found.map_err(|error| match error {
+    encounter.map_err(|error| match error {
         ChoiceError::NoLaneChange { is_recorded, others } => {
             lacks_lane_change(&file.to_string(), track.map(|track| (track, is_recorded)), &others)
         }

@@ -152,7 +152,7 @@ pub(super) struct Results {
 }
 
 impl Results {
-    /// Locks the folder of a campaign, which is told whether it goes on without the folder.
+    /// Locks the folder of a campaign. Tells the campaign whether it may go on without the folder.
     pub(super) fn start(args: &ResultsArgs, campaign: &mut Campaign, manifest: &Manifest) -> Result<Self, CliError> {
         let (locked, lost) = match args.place() {
             Place::Nowhere => (None, None),
@@ -195,16 +195,16 @@ impl Results {
     }
 }
 
-/// Remembers that the folder of a running campaign is the user's own. Only a folder whose commands run
-/// in this working folder is.
+/// Remembers that the folder of a running campaign is the user's own, if its commands run in this
+/// working folder.
 pub(super) fn remember_here(folder: &Folder, manifest: &Manifest) {
-    if folder.manifest().is_ok_and(|there| there.working_folder == manifest.working_folder) {
+    if folder.manifest().is_ok_and(|saved| saved.working_folder == manifest.working_folder) {
         remember(folder);
     }
 }
 
-/// Remembers that the folder is the user's own. If that fails, a later command does not run the code that it
-/// names, and does not repeat its command line.
+/// Remembers that the folder is the user's own. If that fails, a later command neither runs the code
+/// that the folder names nor repeats its command line.
 pub(super) fn remember(folder: &Folder) {
     let has_code = !folder.manifest().is_ok_and(|manifest| manifest.foreign_code().is_empty());
     if let Err(error) = folder.remember()
@@ -225,7 +225,7 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
     }
     let taken = take(working_folder, manifest, |Unfinished { path, previous }| {
         print_error(format_args!(
-            "the campaign in {} has not come to its end: it is replaced, and {} keeps the last finished results\n",
+            "the campaign in {} is unfinished: it is replaced, and {} keeps the last finished results\n",
             path.display(),
             previous.display()
         ));
@@ -238,20 +238,20 @@ fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest)
             let resumed =
                 Resume { command: &command, retries_errors: false, moved_to: Some(&folder), working_folder: None };
             let resume = command_for(&Action::Resume(resumed));
-            print_error(format_args!("their campaign has not come to its end; it is resumed by: {resume}\n"));
+            print_error(format_args!("their campaign is unfinished; it is resumed by: {resume}\n"));
         }
     }
     Ok(taken.locked)
 }
 
 /// Returns the samples to record: the samples of the command line, else the worst of each kind. The
-/// environment can switch off the latter recordings.
+/// environment can switch off recordings that the command line does not ask for.
 pub(super) fn selection(named: Option<Selection>) -> Selection {
     named.unwrap_or_else(|| Selection { each_kind: is_recording_enabled(), ..Selection::default() })
 }
 
-/// Returns true if a campaign can do without its default folder: the folder cannot be written.
-/// Otherwise the user should know of the obstacle before anything runs.
+/// Returns true if a campaign may go on without its default folder, because the folder cannot be
+/// written. After any other error, nothing runs.
 fn may_go_on(error: &FolderError) -> bool {
     matches!(error, FolderError::Write(_))
 }
@@ -284,7 +284,7 @@ pub(super) fn last_results() -> Result<Folder, CliError> {
     let folder = Folder::open(path);
     if !folder.file(REPORT).is_file() {
         return Err(CliError::usage(format!(
-            "{RESULTS} has no report: its campaign has not come to its end; the same command with --resume goes on with it"
+            "{RESULTS} has no report: its campaign is unfinished; the same command with --resume continues it"
         )));
     }
     Ok(folder)

@@ -84,18 +84,18 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     // The margin increase system needs a lead vehicle; a driver that is sampled does not.
     let lead = if args.transfer { Lead::Required } else { Lead::LeftOut };
     let wanted = Wanted { track: args.lane_change, number: args.number, lead };
-    let zero_of = |found: RecordedEncounter| {
-        let source = format!("{} (track {})", args.file.display(), found.change.track_id);
-        let zero = step_zero(&found, (Path::new(&source), &args.set.settings), args.seed);
+    let zero_of = |encounter: RecordedEncounter| {
+        let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
+        let zero = step_zero(&encounter, (Path::new(&source), &args.set.settings), args.seed);
         let zero = zero.map_err(|error| match error {
             StepZeroError::Step(error) => of_step(error, 0),
             not_reproduced @ StepZeroError::NotReproduced(_) => {
                 CliError::NotReproduced { file: args.file.display().to_string(), source: not_reproduced }
             }
         })?;
-        Ok((found, source, zero))
+        Ok((encounter, source, zero))
     };
-    let (found, source, zero) = chosen_by(&args.file, &args.read, wanted, zero_of)??;
+    let (encounter, source, zero) = chosen_by(&args.file, &args.read, wanted, zero_of)??;
     let inputs = (Path::new(&source), &args.set.settings[..]);
     let last_key = key.rsplit('.').next().unwrap_or_default();
     // Only a parameter of the vehicle that changes lanes is calibrated.
@@ -104,12 +104,13 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let variation = variation(from.ok_or_else(|| {
         usage(format!("--from is missing: `{}` has no calibrated value from which the steps start", args.vary))
     })?)?;
-    let mut all = Sampled::new(&found, (zero.recorded, zero.run.run), (zero.reproduction, zero.step.lane_change_s[1]));
+    let mut all =
+        Sampled::new(&encounter, (zero.recorded, zero.run.run), (zero.reproduction, zero.step.lane_change_s[1]));
     let mut films: Vec<_> = zero.run.film.into_iter().collect();
     let mut files: Vec<(String, ScenarioFile)> = Vec::new();
     let mut steps = vec![zero.step];
     let scenario_of = |value: StepValue<'_>| {
-        let made = sampled(&found, (&zero.driver, Some(value)), inputs);
+        let made = sampled(&encounter, (&zero.driver, Some(value)), inputs);
         made.map_err(|error| of_value(&args.vary, value, error))
     };
     // The last value is checked first: the message names it as the user wrote it, not one between.
@@ -117,7 +118,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     for (number, value) in (1..).zip(variation.steps()) {
         let step = scenario_of(value)?;
         let work = format!("running step {number} of {}", args.steps);
-        let done = during(work, || run_step(&found, (value.label(), Some(value.value)), &step, args.seed));
+        let done = during(work, || run_step(&encounter, (value.label(), Some(value.value)), &step, args.seed));
         let done = done.map_err(|error| of_step(error, number))?;
         films.extend(done.film);
         all.runs.push(done.run);
@@ -125,7 +126,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     }
     for (number, (step, run)) in steps.into_iter().zip(&all.runs[1..]).enumerate() {
         if let Some(cut_out_thw_s) = run.thw_opp1_at_crossing_s.filter(|_| args.transfer) {
-            let transferred = step.transferred(&found, cut_out_thw_s, Path::new(&source))?;
+            let transferred = step.transferred(&encounter, cut_out_thw_s, Path::new(&source))?;
             files.push((format!("transferred-{number}.toml"), transferred));
         }
         files.push((format!("step-{number}.toml"), step.file));

@@ -65,7 +65,7 @@ pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
             check_camera(nominal.sensors.camera())?;
         }
         let of_file = |on_progress: &(dyn Fn([u64; 2]) + Sync)| {
-            Study::watched(&file, Some(choice.mode()), (args.seed, extent), on_progress)
+            Study::watched(&file, Some(choice.mode()), args.seed, extent, on_progress)
         };
         Ok(watched("approaches", of_file)?)
     };

@@ -205,9 +205,9 @@ fn run<T, E>(
     let (mut stop, bar) = (StopFlag::default(), progress_bar(steps));
     session::stop_on_request(&mut stop);
     let _heartbeat = heartbeat(&bar);
-    let found = study(&stop, &mut || bar.inc(1));
+    let result = study(&stop, &mut || bar.inc(1));
     bar.finish_and_clear();
-    found
+    result
 }
 
 /// Prints a study, and writes its files. Without a result, a signal has ended it, and nothing is kept.
@@ -241,8 +241,8 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> 
     plan.method = args.method;
     (plan.trajectories, plan.rows, plan.top) = (number(args.trajectories), number(args.rows), number(args.top));
     (plan.seed, plan.workers) = (study.seed, Workers::with_jobs(study.jobs));
-    let found = run(plan.points() as u64, |stop, step| plan.run(stop, step))?;
-    study.print(found.map(Study::Sensitivity))
+    let result = run(plan.points() as u64, |stop, step| plan.run(stop, step))?;
+    study.print(result.map(Study::Sensitivity))
 }
 
 pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
@@ -265,8 +265,8 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     }
     let plan = FrontierPlan { file, grid, sampling, controllers, sensors, workers };
     let prepared = plan.prepare()?;
-    let found = run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
-    study.print(found.map(Study::Frontier))
+    let result = run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
+    study.print(result.map(Study::Frontier))
 }
 
 pub(super) fn boundary(args: &BoundaryArgs) -> Result<ExitCode, CliError> {
@@ -276,8 +276,8 @@ pub(super) fn boundary(args: &BoundaryArgs) -> Result<ExitCode, CliError> {
     let mut plan = BoundaryPlan::new(&file, &args.along, args.event, &study.controllers(&file)?, sensors)?;
     plan.budget = usize::try_from(args.runs).unwrap_or(usize::MAX);
     (plan.seed, plan.sample, plan.workers) = (study.seed, args.sample, Workers::with_jobs(study.jobs));
-    let found = run(args.runs, |stop, step| plan.run(stop, step))?;
-    study.print(found.map(Study::Boundary))
+    let result = run(args.runs, |stop, step| plan.run(stop, step))?;
+    study.print(result.map(Study::Boundary))
 }
 
 pub(super) fn anchor(args: &AnchorArgs) -> Result<ExitCode, CliError> {
@@ -290,6 +290,6 @@ pub(super) fn anchor(args: &AnchorArgs) -> Result<ExitCode, CliError> {
             AnchorError::Apply(error) => CliError::from(error),
             AnchorError::Scenario(error) => CliError::from(error),
         })?;
-    let found = run(plan.samples(), |stop, step| plan.run(stop, step)).map_err(CampaignError::from)?;
-    print(found.map(Study::Anchor), args.format, args.out.as_deref())
+    let result = run(plan.samples(), |stop, step| plan.run(stop, step)).map_err(CampaignError::from)?;
+    print(result.map(Study::Anchor), args.format, args.out.as_deref())
 }

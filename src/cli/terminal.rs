@@ -67,7 +67,7 @@ fn has_command(line: &str) -> bool {
 /// also breaks words that are wider than the terminal.
 ///
 /// Two spaces or more separate the cells of a row. A row that is too wide goes on with a whole cell,
-/// so that the end of one cell and the begin of the next do not read as one.
+/// so that the end of one cell and the beginning of the next do not read as one.
 fn wrapped(text: &str, width: usize, breaks_words: bool) -> String {
     let width = width.max(LEAST_WIDTH);
     let mut lines = Vec::new();
@@ -118,7 +118,7 @@ fn wrapped_line(content: &str, indent: usize, (width, breaks_words): (usize, boo
 /// Returns a style of the terminal.
 type NewStyle = fn() -> Style;
 
-/// The words at the begin of a line that have a colour.
+/// The words at the beginning of a line that have a colour.
 const WORDS: [(&str, NewStyle); 11] = [
     ("PASS", good),
     ("FAIL", bad),
@@ -145,7 +145,7 @@ fn undecided() -> Style {
     Style::new().yellow().bold()
 }
 
-/// Colours the word at the begin of each line that has one.
+/// Colours the word at the beginning of each line that has one.
 fn coloured(text: &str) -> String {
     let colour = |line: &str| {
         let start = line.trim_start();

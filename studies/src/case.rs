@@ -86,7 +86,7 @@ pub enum CausesError {
     },
     /// A scenario of a campaign is not the counted encounter.
     #[error(
-        "in `{scenario}` the lead vehicle brakes in {braked} of {runs} samples: the counted event is the begin of this \
+        "in `{scenario}` the lead vehicle brakes in {braked} of {runs} samples: the counted event is the beginning of this \
          braking, about which these samples say nothing; a scenario in which it brakes in at least 95 % is needed"
     )]
     OtherEncounter {

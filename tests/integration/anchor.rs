@@ -15,14 +15,14 @@ fn study(more: &[&str]) -> Vec<String> {
 fn the_study_counts_both_outcomes_and_compares_them_with_what_was_published() {
     let folder = folder();
     let out = folder.path().join("anchor");
-    let found = json(&closecall(study(&["--format", "json", "--out", out.to_str().unwrap()])), 0);
+    let result = json(&closecall(study(&["--format", "json", "--out", out.to_str().unwrap()])), 0);
     let names: Vec<&str> =
-        found["members"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
+        result["members"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["the scenario's own drivers", "glances"]);
-    assert_eq!(found["without_effect"][0], "steer-none");
-    assert_eq!(found["variations"].as_array().unwrap().len(), 10);
-    assert_eq!(found["controllers"], serde_json::json!(["human-aeb", "human+aeb"]));
-    for row in found["members"].as_array().unwrap().iter().chain(found["variations"].as_array().unwrap()) {
+    assert_eq!(result["without_effect"][0], "steer-none");
+    assert_eq!(result["variations"].as_array().unwrap().len(), 10);
+    assert_eq!(result["controllers"], serde_json::json!(["human-aeb", "human+aeb"]));
+    for row in result["members"].as_array().unwrap().iter().chain(result["variations"].as_array().unwrap()) {
         assert_eq!(row["samples"], 16, "{row}");
         for outcome in ["striking", "struck"] {
             let count = |key: &str| row[outcome][key].as_u64().unwrap();
@@ -32,7 +32,7 @@ fn the_study_counts_both_outcomes_and_compares_them_with_what_was_published() {
         assert!(row["striking"]["with"].as_u64() <= row["striking"]["without"].as_u64(), "{row}");
     }
     for (outcome, published) in [("striking", 0.5), ("struck", 1.2)] {
-        assert_eq!(found["conclusions"][outcome]["published_ratio"], published);
+        assert_eq!(result["conclusions"][outcome]["published_ratio"], published);
     }
     for name in ["anchor.html", "anchor.json", "anchor-ratios.svg"] {
         assert!(out.join(name).exists(), "{name}");

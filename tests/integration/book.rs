@@ -114,8 +114,8 @@ fn guides_have_no_heavy_phrases() {
         let is_in = |folder: &str| path.starts_with(Path::new(ROOT).join("docs").join(folder));
         let phrases: &[&str] =
             if is_in("how-to") || is_in("start") { &["of which", "that of", "those of"] } else { &["of which"] };
-        let found = heavy_phrases(&std::fs::read_to_string(&path).unwrap(), phrases);
-        assert!(found.is_empty(), "{}: {found:?}", path.display());
+        let heavy = heavy_phrases(&std::fs::read_to_string(&path).unwrap(), phrases);
+        assert!(heavy.is_empty(), "{}: {heavy:?}", path.display());
     }
 }
 

@@ -42,8 +42,8 @@ fn an_ego_that_is_slower_and_does_not_look_back_fails_the_headline() {
                 && text.contains("NOT MET: low-thw-overtake: MIS-9"),
             "{text}"
         );
-        // The fault prevents more than the system does: the demand on prevented collisions does not
-        // tell them apart.
+        // An ego that is always slower prevents more than the system does: the demand on prevented
+        // collisions does not tell them apart.
         assert!(text.contains("\n  met: low-thw-overtake: MIS-1"), "{text}");
     }
 }
@@ -82,7 +82,7 @@ fn a_clock_in_place_of_a_measured_approach_fails_the_headline() {
     }
     let folder = folder();
     let out = folder.path().join("out");
-    // The second looks whether anybody is behind, and not whether that vehicle approaches.
+    // The second controller looks whether a vehicle is behind, but not whether that vehicle approaches.
     for (condition, checks) in [("True", &[][..]), ("seen", &["--no-validity-checks"])] {
         let controller = clock(folder.path(), condition);
         let _ = std::fs::remove_dir_all(&out);
@@ -199,7 +199,7 @@ fn a_weakened_check_gives_overridden_and_exit_code_4() {
             && text.contains("\n  the validity of the simulator was not checked"),
         "{text}"
     );
-    // What is saved knows it, too.
+    // The saved campaign is overridden, too.
     let parts = ["1/2", "2/2"].map(|part| {
         let folder = folder.path().join(part.replace('/', "-"));
         let args = ["-n", "80", "--sensors", "object", "--paired", "--set", weaker, "--partition", part];
@@ -285,7 +285,7 @@ fn what_a_controller_from_outside_says_of_itself_is_no_evidence() {
         return;
     }
     let folder = folder();
-    // It claims to act, and does nothing.
+    // The controller claims to act, and does nothing.
     let controller = python_controller(folder.path(), "state = 'increasing'");
     let path = library("overtake-without-brake");
     let gated = |gate: &str, expected| {
@@ -455,7 +455,7 @@ fn a_verdict_on_a_controller_from_outside_says_that_its_seed_was_known() {
     for name in ["report.html", "summary.md", "junit.xml"] {
         assert!(std::fs::read_to_string(out.join(name)).unwrap().contains(REMARK), "{name}");
     }
-    // A part has the seed of the others, and the merged campaign knows it, too.
+    // A part has the seed of the other parts. The verdict of the merged campaign has the remark, too.
     let parts = ["1/2", "2/2"].map(|part| folder.path().join(part.replace('/', "-")).display().to_string());
     for (part, folder) in ["1/2", "2/2"].into_iter().zip(&parts) {
         let text =
@@ -609,7 +609,7 @@ fn a_limit_of_collisions_holds_for_each_scenario() {
         let is_limit = |gate: &&serde_json::Value| gate["subject"] == "count(ego_collided)";
         value["gates"].as_array().unwrap().iter().filter(is_limit).map(|gate| gate["passed"].as_bool()).collect()
     };
-    // Together they collide more often than is allowed, and that is not asked.
+    // Both scenarios together have more collisions than the limit, which applies to each of them.
     assert_eq!(passed(&run(most)), [Some(true); 2]);
     assert!(passed(&run(most - 1)).contains(&Some(false)));
 }

@@ -16,6 +16,7 @@ use closecall_testing::browser;
 use serde_json::json;
 use tempfile::TempDir;
 
+use crate::foreign_folders::TELLING;
 use crate::page::Page;
 use crate::support::{code, folder, library, message, program, stdout};
 
@@ -262,14 +263,6 @@ fn the_server_leaves_its_folder_by_no_path_and_no_link() {
     symlink(folder.path().join("elsewhere"), out.join("recordings")).unwrap();
     assert_eq!(served.ask("GET", "recordings/own.html").0, 404);
 }
-
-/// A controller that says that it runs, in a file beside it.
-const TELLING: &str = r#"#!/bin/sh
-echo ran >> "$(dirname "$0")/ran"
-echo '{"type":"hello","protocol":1,"name":"telling","version":"1"}'
-read -r line
-while read -r line; do echo '{"acceleration_mps2":0.0,"state":"following"}'; done
-"#;
 
 #[test]
 fn commands_of_a_foreign_folder_do_not_run_by_a_click() {

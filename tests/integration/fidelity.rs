@@ -4,12 +4,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
-use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, json_file, library, message, program, stderr, stdout};
+use crate::support::{
+    closecall, code, folder, json, json_file, library, message, program, stderr, stdout, wait_for_results,
+};
 
 fn campaign(out: &Path, words: &str) -> PathBuf {
     let path = library("low-thw-overtake");
@@ -217,12 +218,7 @@ fn a_signal_ends_a_campaign_among_its_fast_samples_without_a_verdict() {
     let mut command = program();
     command.args(words.split_whitespace()).arg(&out).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    let (journal, started) = (out.join("fidelity/journal.jsonl"), Instant::now());
-    while fs::metadata(&journal).map_or(0, |journal| journal.len()) < 10_000 {
-        assert!(child.try_wait().unwrap().is_none(), "the campaign ended too early");
-        assert!(started.elapsed() < Duration::from_secs(300), "the campaign hangs");
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    wait_for_results(&mut child, &out.join("fidelity/journal.jsonl"));
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();
     let text = stdout(&output, 130);

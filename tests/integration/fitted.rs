@@ -41,7 +41,7 @@ fn an_unknown_name_in_a_fitted_file_is_refused_with_the_allowed_ones() {
         let output = closecall([command, scenario.to_str().unwrap(), "--fitted", fitted.to_str().unwrap()]);
         assert_eq!(code(&output), 3, "{command}: {}", message(&output));
         let said = message(&output);
-        assert!(said.contains("`brake` is no parameter of low-thw-overtake: allowed are brake-mps2"), "{said}");
+        assert!(said.contains("`brake` is not a parameter of low-thw-overtake: allowed are brake-mps2"), "{said}");
     }
     let missing = closecall(["check", scenario.to_str().unwrap(), "--fitted", "/no/such.toml"]);
     assert_eq!(code(&missing), 6, "{}", message(&missing));

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use closecall_testing::has_python;
 
-use crate::native_controllers::{campaign, is_as_baseline};
+use crate::native_controllers::{assert_costs_fast_samples, campaign, is_as_baseline};
 use crate::support::{ROOT, code, folder, headline_with, message, program, records, stderr, stdout};
 
 /// Builds the FMU of the example, and returns the value of `--controller`.
@@ -122,19 +122,7 @@ fn a_fault_of_an_fmu_costs_its_samples_and_changes_no_other() {
         let out = folder.path().join(fault);
         let output = campaign(&controller, &out, "2", Some(fault), &["--controller-timeout-ms", "500"]);
         assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
-        let mut failed = 0;
-        for record in records(&out) {
-            let values = serde_json::to_value(&record.arms[0].result.as_ref().unwrap().parameters).unwrap();
-            let is_fast = values["cruise-mps"].as_f64().unwrap() >= 32.7;
-            match &record.arms[1].result {
-                Ok(_) => assert!(!is_fast && is_as_baseline(&record), "{fault}: sample {}", record.sample),
-                Err(failure) => {
-                    assert!(is_fast && failure.message.contains(expected), "{fault}: {}", failure.message);
-                    failed += 1;
-                }
-            }
-        }
-        assert!(failed > 1, "{fault} shows in {failed} samples");
+        assert_costs_fast_samples(&records(&out), fault, expected);
     }
     // A process that crashes leaves nothing behind: the program that has unpacked the FMU for it
     // removes the folder.

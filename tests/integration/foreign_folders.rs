@@ -10,7 +10,7 @@ use crate::native_controllers::{compile, lib};
 use crate::support::{code, folder, message, program, stderr, stdout};
 
 /// A controller that says that it runs, in a file beside it.
-const TELLING: &str = r#"#!/bin/sh
+pub(crate) const TELLING: &str = r#"#!/bin/sh
 echo ran >> "$(dirname "$0")/ran"
 echo '{"type":"hello","protocol":1,"name":"telling","version":"1"}'
 read -r line
@@ -242,8 +242,7 @@ fn neither_a_link_nor_a_named_pipe_is_taken_for_a_file_of_a_folder() {
             }
             let output = within_a_minute(&mut campaign());
             assert_eq!(code(&output), 6, "{name}: {}", stderr(&output));
-            let refusal =
-                if is_pipe { "it is a named pipe, and no file" } else { "it is a symbolic link, and no file" };
+            let refusal = if is_pipe { "it is a named pipe, not a file" } else { "it is a symbolic link, not a file" };
             assert!(
                 message(&output).contains(name) && message(&output).contains(refusal),
                 "{name}: {}",
@@ -308,7 +307,7 @@ fn a_step_summary_that_is_a_named_pipe_costs_a_warning_and_no_time() {
             assert!(stdout(&output, expected).contains("measured, not judged"), "{more:?}: {}", stderr(&output));
             let warning = "warning: the summary for the CI server (GITHUB_STEP_SUMMARY) is missing: failed to write";
             assert!(message(&output).contains(warning), "{more:?}: {}", stderr(&output));
-            assert!(message(&output).contains("it is a named pipe, and no file"), "{more:?}: {}", stderr(&output));
+            assert!(message(&output).contains("it is a named pipe, not a file"), "{more:?}: {}", stderr(&output));
             if let Some(mut reader) = reader {
                 let _ = reader.kill();
                 reader.wait().unwrap();

@@ -100,7 +100,7 @@ fn an_endless_input_is_refused() {
     for case in cases {
         let output = closecall(case);
         assert!([3, 6].contains(&code(&output)), "{case:?}: {}", stderr(&output));
-        assert!(message(&output).contains("it is a device, and no file"), "{case:?}: {}", stderr(&output));
+        assert!(message(&output).contains("it is a device, not a file"), "{case:?}: {}", stderr(&output));
     }
 }
 

@@ -40,13 +40,20 @@ pub(crate) fn lib(path: &Path) -> String {
     format!("lib:{}", path.display())
 }
 
-/// The fault that a process shows: see `faulty.c`.
+/// Runs a command whose controller shows a fault of `faulty.c`.
 pub(crate) fn with_fault(command: &mut Command, fault: Option<&str>) -> Output {
     match fault {
         Some(fault) => command.env("FAULT", fault),
         None => command,
     };
     command.output().unwrap()
+}
+
+/// Runs one sample with a controller that shows a fault in this sample.
+fn run_with_fault(controller: &str, fault: &str) -> Output {
+    let mut command = program();
+    command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", controller]);
+    with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
 }
 
 const SAMPLES: &str = "24";
@@ -84,6 +91,28 @@ pub(crate) fn is_as_baseline(record: &Record) -> bool {
     let [baseline, tested] = [0, 1].map(|arm| record.arms[arm].result.as_ref());
     let (Ok(baseline), Ok(tested)) = (baseline, tested) else { return false };
     named_as(tested, baseline).has_same_bits(baseline)
+}
+
+/// Returns true if a record is of a sample in which `faulty.c` shows its fault: the ego is fast.
+pub(crate) fn has_fast_ego(record: &Record) -> bool {
+    let baseline = record.arms[0].result.as_ref().unwrap();
+    serde_json::to_value(&baseline.parameters).unwrap()["cruise-mps"].as_f64().unwrap() >= 32.7
+}
+
+/// Asserts that a fault costs the samples with a fast ego, with the expected message, and no others.
+pub(crate) fn assert_costs_fast_samples(records: &[Record], fault: &str, expected: &str) {
+    let mut failed = 0;
+    for record in records {
+        let is_fast = has_fast_ego(record);
+        match &record.arms[1].result {
+            Ok(_) => assert!(!is_fast && is_as_baseline(record), "{fault}: sample {}", record.sample),
+            Err(failure) => {
+                assert!(is_fast && failure.message.contains(expected), "{fault}: {}", failure.message);
+                failed += 1;
+            }
+        }
+    }
+    assert!(failed > 1, "{fault} shows in {failed} samples");
 }
 
 /// The library of the example in Rust, which `cargo test` builds.
@@ -165,20 +194,7 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
             records.iter().map(|record| record.arms.iter().map(|arm| arm.result.clone()).collect::<Vec<_>>()).collect()
         };
         assert!(shown(&results[0]) == shown(&results[1]), "{fault}");
-        let mut failed = 0;
-        for record in &results[0] {
-            let baseline = record.arms[0].result.as_ref().unwrap();
-            let values = serde_json::to_value(&baseline.parameters).unwrap();
-            let is_fast = values["cruise-mps"].as_f64().unwrap() >= 32.7;
-            match &record.arms[1].result {
-                Ok(_) => assert!(!is_fast && is_as_baseline(record), "{fault}: sample {}", record.sample),
-                Err(failure) => {
-                    assert!(is_fast && failure.message.contains(expected), "{fault}: {}", failure.message);
-                    failed += 1;
-                }
-            }
-        }
-        assert!(failed > 1, "{fault} shows in {failed} samples");
+        assert_costs_fast_samples(&results[0], fault, expected);
     }
     let mut command = program();
     command.args([
@@ -327,11 +343,7 @@ fn an_error_stays_one_until_it_is_tried_again() {
 fn a_crash_in_a_single_run_is_an_error_and_what_a_library_prints_is_no_answer() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
-    let run = |fault| {
-        let mut command = program();
-        command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", &library]);
-        with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
-    };
+    let run = |fault| run_with_fault(&library, fault);
     let output = run("segfault");
     assert_eq!(code(&output), 5, "{}", stderr(&output));
     assert!(message(&output).contains("signal: 11 (SIGSEGV)"), "{}", stderr(&output));
@@ -353,11 +365,7 @@ fn a_crash_in_a_single_run_is_an_error_and_what_a_library_prints_is_no_answer() 
 fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_library_is_unloaded_is_none() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
-    let run = |fault| {
-        let mut command = program();
-        command.args(["run", "low-thw-overtake", "--sensors", "object", "--controller", &library]);
-        with_fault(command.env("FAULT_ALWAYS", "1"), Some(fault))
-    };
+    let run = |fault| run_with_fault(&library, fault);
     for (fault, expected) in [
         ("frees", "the controller ended its process (signal: 6 (SIGABRT)); it last wrote: freed twice"),
         ("frees-never", "the process hangs: no answer in twice the 1000 ms allowed"),

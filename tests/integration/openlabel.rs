@@ -423,7 +423,7 @@ fn malformed_labels_are_refused_with_their_place() {
             "`openlabel.metadata.schema_version` is `0.3.0`",
         ),
         (
-            "a version that is no text",
+            "a version that is not text",
             with("\"schema_version\":\"1.0.0\"", "\"schema_version\":1"),
             "`openlabel.metadata`: invalid type: integer",
         ),

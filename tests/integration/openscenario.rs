@@ -215,7 +215,7 @@ fn a_trajectory_becomes_speeds_and_lane_changes() {
         (TIMING, &[(0.0, -2, 170.0), (1.0, -2, 160.0)], "-10.00 m/s"),
         (TIMING, &[(0.0, -2, 170.0), (0.0, -2, 190.0)], "`time` must grow"),
         (TIMING, &[(0.0, -2, 170.0)], "two vertices"),
-        (TIMING, &[(0.0, -2, 170.0), (1.0, -3, 190.0)], "lane -3 is no driving lane"),
+        (TIMING, &[(0.0, -2, 170.0), (1.0, -3, 190.0)], "lane -3 is not a driving lane"),
         (&never, &points, "one of absolute, relative"),
         (&absolute, &points, "begins at 0.00 s, and its event at 3.0"),
     ];
@@ -291,7 +291,7 @@ fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names(
         ("", "", &["--value-set", "0"], "from 1 to 2"),
         ("\"Gap\"", "\"Gab\"", first, "there is no parameter `Gab`"),
         ("value=\"60\"", "value=\"wide\"", first, "`Gap`, whose value is given from outside: `value` is `wide`"),
-        ("value=\"60\"", "worth=\"60\"", first, "`worth` is no attribute"),
+        ("value=\"60\"", "worth=\"60\"", first, "`worth` is not an attribute"),
         ("case.xosc", "cases.xosc", first, "values.xosc:2: `ScenarioFile`: failed to read"),
         ("case.xosc", "values.xosc", first, "must name a scenario"),
         ("</OpenSCENARIO>", "<Storyboard/></OpenSCENARIO>", first, "`Storyboard`: a file of values has nothing beside"),
@@ -306,7 +306,7 @@ fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names(
         assert!(!output.exists(), "{wrong}");
     }
     let refused = imported(&folder.path().join("case.xosc"), &output, &["--value-set", "1"]);
-    assert!(message(&refused).contains("no file of values"), "{}", message(&refused));
+    assert!(message(&refused).contains("not a file of values"), "{}", message(&refused));
 }
 
 /// Returns a file of distributions for the scenario `case.xosc`.
@@ -473,7 +473,7 @@ fn the_distributions_that_closecall_exports_come_back_as_distributions() {
         ),
         (
             "<ProbabilityDistributionSet><Element value=\"full\" weight=\"1\"/></ProbabilityDistributionSet>",
-            "`ProbabilityDistributionSet`: `brake-mps2`: `full` is no number",
+            "`ProbabilityDistributionSet`: `brake-mps2`: `full` is not a number",
         ),
     ] {
         let start = "<StochasticDistribution parameterName=\"brake_mps2\">";
@@ -671,7 +671,7 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
             "RelativeTargetLane entityRef=\"Ego\" value=\"4\"",
             &["RelativeTargetLane", "only -1, -2"],
         ),
-        ("<LaneChangeAction>", "<LaneOffsetAction continuous=\"false\">", &["it is no XML document"]),
+        ("<LaneChangeAction>", "<LaneOffsetAction continuous=\"false\">", &["it is not an XML document"]),
         ("TimeHeadwayCondition", "OffroadCondition", &["OffroadCondition", "not read"]),
         (
             "storyboardElementRef=\"cut-in\"",
@@ -719,8 +719,8 @@ fn faults() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
 /// and the words that the message must have.
 fn faults_of_attributes() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
     vec![
-        ("<Event name=", "<Event colour=\"red\" name=", &["`Event`", "`colour` is no attribute", "name, priority"]),
-        ("<Init>", "<Init speed=\"3\">", &["`Init`", "`speed` is no attribute of it, which can have none"]),
+        ("<Event name=", "<Event colour=\"red\" name=", &["`Event`", "`colour` is not an attribute", "name, priority"]),
+        ("<Init>", "<Init speed=\"3\">", &["`Init`", "`speed` is not an attribute of it, which can have none"]),
         ("<Init>", "<Init/><Init>", &["`Init`", "`Storyboard` has one already"]),
         ("<Storyboard>", "<Storyboard>now", &["`Storyboard`", "`now`", "no text is allowed"]),
         ("priority=\"parallel\"", "priority=\"foo\"", &["`Event`", "`foo`", "overwrite, override, parallel, skip"]),
@@ -891,12 +891,12 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
     let faults: [(&str, &str, &str); 33] = [
-        ("<OpenDRIVE>", "<OpenStreet>", "it is no XML"),
+        ("<OpenDRIVE>", "<OpenStreet>", "it is not an XML"),
         ("</OpenDRIVE>", "", "ends before its root element"),
         ("OpenDRIVE", "Roads", "`OpenDRIVE`"),
         ("id=\"1\"", "id=\"2\"", "no road `1`"),
         ("id=\"1\"", "", "no road `1`"),
-        ("<planView>", "<planView><planView>", "no XML"),
+        ("<planView>", "<planView><planView>", "not an XML"),
         ("planView", "plan", "no `planView`"),
         ("curvature=\"0.001\"", "", "needs `curvature`"),
         ("curvature=\"0.001\"", "curvature=\"round\"", "`curvature` is `round`"),
@@ -905,7 +905,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("lanes>", "ways>", "no `lanes`"),
         ("laneSection", "section", "no `laneSection`"),
         ("right>", "left>", "no lanes on the right"),
-        ("type=\"driving\"", "type=\"walking\"", "no driving lane"),
+        ("type=\"driving\"", "type=\"walking\"", "not a driving lane"),
         ("id=\"-1\"", "id=\"one\"", "`id` is `one`"),
         ("a=\"3.5\"", "", "needs `a`"),
         ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
@@ -933,7 +933,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
             | "no `lanes`"
             | "no `laneSection`"
             | "no lanes on the right"
-            | "no driving lane"
+            | "not a driving lane"
             | "`a` is 35; a lane" => ROAD.replace(right, wrong),
             _ => ROAD.replacen(right, wrong, 1),
         };
@@ -942,7 +942,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         assert_eq!(code(&refused), 3, "{wrong}: {said}");
         assert!(said.contains(word), "{wrong}: {word}: {said}");
         // A position that names no road or no lane is an error of the scenario.
-        let is_of_scenario = word.starts_with("no road") || word == "no driving lane";
+        let is_of_scenario = word.starts_with("no road") || word == "not a driving lane";
         assert!(said.contains(if is_of_scenario { "case.xosc:42: `LanePosition`" } else { "road.xodr:" }), "{said}");
         assert!(!output.exists(), "{wrong}");
     }

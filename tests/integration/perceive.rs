@@ -402,7 +402,7 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
         (
             "poses.csv",
             replaced("poses.csv", "\n0.0,", "\nnoon,"),
-            "poses.csv, line 2, column `time_s`: `noon` is no finite number",
+            "poses.csv, line 2, column `time_s`: `noon` is not a finite number",
         ),
         (
             "labels.csv",

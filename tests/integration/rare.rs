@@ -389,31 +389,31 @@ fn a_folder_of_weighted_runs_is_named_for_what_it_is() {
 #[test]
 fn a_search_finds_a_collision_that_is_rare_and_writes_its_smallest_case() {
     let place = folder();
-    let [found, again] = ["found", "again"].map(|name| place.path().join(name));
+    let [first, second] = ["found", "again"].map(|name| place.path().join(name));
     let run = |out: &Path, more: &str| {
         rare(&format!("--design search --event collision --seed 1 --out {} {more}", out.display()))
     };
-    let text = stdout(&run(&found, "--jobs 1"), 1);
+    let text = stdout(&run(&first, "--jobs 1"), 1);
     assert!(text.contains("a search states no probability"), "{text}");
-    let result = json_file(&found.join("rare.json"));
+    let result = json_file(&first.join("rare.json"));
     let report = &result["scenarios"][0];
     assert_eq!(report["search"]["has_event"], true);
     assert!(report["runs"].as_u64().unwrap() < 2_000, "{report}");
     assert_eq!(report["estimates"].as_array().unwrap().len(), 0);
     let case = |name: &str| {
-        let path = found.join(name);
+        let path = first.join(name);
         stdout(&closecall(["run", path.to_str().unwrap(), "--controller", "acc"]), 0)
     };
     assert!(case("known-rare-probability-found.toml").contains("COLLISION"));
     assert!(!case("known-rare-probability-found-passes.toml").contains("COLLISION"));
     // Cut off and resumed: the same journal.
-    run(&again, "--jobs 2");
+    run(&second, "--jobs 2");
     let journal = |out: &Path| fs::read(out.join("rare-journal.jsonl")).unwrap();
-    assert_eq!(journal(&found), journal(&again));
-    let kept = journal(&again);
-    fs::write(again.join("rare-journal.jsonl"), &kept[..kept.len() / 2]).unwrap();
-    code(&run(&again, "--resume"));
-    assert_eq!(journal(&again), kept);
+    assert_eq!(journal(&first), journal(&second));
+    let kept = journal(&second);
+    fs::write(second.join("rare-journal.jsonl"), &kept[..kept.len() / 2]).unwrap();
+    code(&run(&second, "--resume"));
+    assert_eq!(journal(&second), kept);
 }
 
 #[test]

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::support::{code, folder, journal, json, json_file, library, message, program, stderr, stdout};
+use crate::support::{
+    code, folder, journal, json, json_file, library, message, program, stderr, stdout, wait_for_results,
+};
 
 const RESULTS: &str = "closecall-results";
 const PREVIOUS: &str = "closecall-results.previous";
@@ -313,13 +315,7 @@ fn start(folder: &Path, more: &[&str]) -> std::process::Child {
     let mut command = program();
     command.current_dir(folder).args(endless).args(more);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let journal = folder.join(RESULTS).join("journal.jsonl");
-    let started = Instant::now();
-    while fs::metadata(&journal).map_or(0, |journal| journal.len()) < 10_000 {
-        assert!(child.try_wait().unwrap().is_none(), "the campaign ended too early");
-        assert!(started.elapsed() < Duration::from_secs(300), "the campaign hangs");
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    wait_for_results(&mut child, &folder.join(RESULTS).join("journal.jsonl"));
     child
 }
 
@@ -415,7 +411,7 @@ fn an_unfinished_campaign_does_not_displace_finished_results() {
     let kept = content(&previous);
     let output = sized(folder.path(), "6", &["--record", "worst:1"]);
     stdout(&output, 0);
-    let said = "the campaign in closecall-results has not come to its end: it is replaced, and \
+    let said = "the campaign in closecall-results is unfinished: it is replaced, and \
                 closecall-results.previous keeps the last finished results";
     assert!(message(&output).contains(said), "{}", stderr(&output));
     assert!(!message(&output).contains("the last results are now in"), "{}", stderr(&output));
@@ -543,7 +539,7 @@ fn view_without_arguments_names_the_last_report_and_what_is_missing() {
     assert_eq!(report, "closecall-results/report.html");
     assert!(!recordings.is_empty() && recordings.lines().all(|file| folder.path().join(file).is_file()), "{files}");
     fs::remove_file(folder.path().join(RESULTS).join("report.html")).unwrap();
-    assert!(message(&view(&[])).contains("has not come to its end"), "{}", stderr(&view(&[])));
+    assert!(message(&view(&[])).contains("its campaign is unfinished"), "{}", stderr(&view(&[])));
 }
 
 #[test]

@@ -307,9 +307,9 @@ fn most_recorded_lane_changes_are_sampled_and_the_rest_is_refused_for_a_reason()
     let (mut sampled, mut refused) = (0, Vec::new());
     for window in ["a", "h"] {
         let file = data.join(format!("ngsim_us101/trajectories/us101_{window}.csv"));
-        let found = json(&closecall(["traffic", "lane-changes", file.to_str().unwrap(), "--format", "json"]), 0);
+        let lane_changes = json(&closecall(["traffic", "lane-changes", file.to_str().unwrap(), "--format", "json"]), 0);
         let mut numbers = std::collections::BTreeMap::new();
-        for change in found.as_array().unwrap_or(&Vec::new()) {
+        for change in lane_changes.as_array().unwrap_or(&Vec::new()) {
             let track = change["track_id"].as_u64().unwrap();
             let number = numbers.entry(track).and_modify(|number| *number += 1).or_insert(1_u32);
             let output = sample(&file, &track.to_string(), &["--number", &number.to_string(), "--steps", "2"]);

@@ -2,7 +2,8 @@
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::time::{Duration, Instant};
 
 use closecall_campaign::folder::Folder;
 use closecall_campaign::record::Record;
@@ -115,6 +116,17 @@ pub(crate) fn journal(out: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(out.join("journal.jsonl")).expect("a journal");
     let record = |line: &str| serde_json::from_str(line.split_once(' ').expect("a checksum").1).expect("a record");
     text.lines().map(record).collect()
+}
+
+/// Waits until a running campaign has written results to its journal.
+pub(crate) fn wait_for_results(campaign: &mut Child, journal: &Path) {
+    const BYTES: u64 = 10_000;
+    let started = Instant::now();
+    while std::fs::metadata(journal).map_or(0, |journal| journal.len()) < BYTES {
+        assert!(campaign.try_wait().unwrap().is_none(), "the campaign ended too early");
+        assert!(started.elapsed() < Duration::from_secs(300), "the campaign hangs");
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Returns the records of a campaign's journal in the order of the samples.

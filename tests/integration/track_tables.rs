@@ -7,7 +7,7 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::tables::{RunTables, TableFiles};
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::sampling::Design;
-use closecall_sensors::{BoxRole, SensorMode};
+use closecall_sensors::{BoxRole, Innovation, SensorMode};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, TrackAuditor, simulate};
 use closecall_testing::python_with;
@@ -21,7 +21,8 @@ const SEED: u64 = 7;
 struct Observers {
     tables: RunTables,
     auditor: TrackAuditor,
-    /// The normalised innovations squared of the rear LiDAR along and across the road.
+    /// The normalised innovations squared (NIS) of the rear LiDAR along and across the road. Their
+    /// mean is 1 for a consistent filter (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.2).
     nis: Vec<[f64; 2]>,
     /// The scans whose boxes are in the tables.
     scans: Vec<u64>,
@@ -35,7 +36,8 @@ impl Observer for Observers {
         let used = view.perception.used_boxes().into_iter();
         // The first scans of a run end before it starts.
         let used = used.filter(|used| used.used.role == BoxRole::Corrects && self.scans.contains(&used.scan));
-        self.nis.extend(used.filter_map(|used| Some(used.used.innovation?.map(|along_axis| along_axis.nis()))));
+        let nis = |axis: Innovation| axis.innovation_m * axis.innovation_m / axis.variance_m2;
+        self.nis.extend(used.filter_map(|used| Some(used.used.innovation?.map(nis))));
     }
 
     fn event(&mut self, time: Time, what: &RunEvent) {
@@ -74,9 +76,9 @@ fn the_documented_query_gives_the_consistency_that_the_tracker_s_own_tests_compu
     let output = Command::new(python).args(["-c", &script]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let printed = String::from_utf8(output.stdout).unwrap();
-    let found: Vec<f64> = printed.split_whitespace().map(|word| word.parse().unwrap()).collect();
-    assert_eq!(found.len(), expected.len(), "{printed}");
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found / expected - 1.0).abs() < 1e-6, "{printed}: {expected}");
+    let computed: Vec<f64> = printed.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    assert_eq!(computed.len(), expected.len(), "{printed}");
+    for (computed, expected) in computed.iter().zip(expected) {
+        assert!((computed / expected - 1.0).abs() < 1e-6, "{printed}: {expected}");
     }
 }

@@ -35,21 +35,26 @@ fn changed(line: &str, change: impl FnOnce(&mut Value)) -> String {
     format!("{} {text}", &blake3::hash(text.as_bytes()).to_hex()[..16])
 }
 
+/// Asserts that each command refuses the journal, and says why.
+fn assert_each_refuses(commands: &[&[&str]], expected: &str) {
+    for command in commands {
+        let output = closecall(*command);
+        assert_eq!(code(&output), 3, "{command:?}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{command:?}: {}", stderr(&output));
+    }
+}
+
 /// Asserts that every command that reads the journal refuses it, and says why.
 fn assert_refused(folder: &Path, out: &Path, sound: &Path, expected: &str) {
     let (out, sound) = (out.to_str().unwrap(), sound.to_str().unwrap());
     let baseline = folder.join("refused.json");
-    let commands: [&[&str]; 4] = [
+    let commands: &[&[&str]] = &[
         &["baseline", "save", out, baseline.to_str().unwrap()],
         &["compare", sound, out],
         &["compare", out, sound],
         &["explain", out],
     ];
-    for command in commands {
-        let output = closecall(command);
-        assert_eq!(code(&output), 3, "{command:?}: {}", stderr(&output));
-        assert!(message(&output).contains(expected), "{command:?}: {}", stderr(&output));
-    }
+    assert_each_refuses(commands, expected);
     assert!(!baseline.exists());
 }
 
@@ -95,7 +100,7 @@ fn a_record_that_is_not_that_of_its_sample_is_refused_by_every_reader() {
         // What is next to it is wrong, too, and so is what stands before it.
         let [dir, figure, case] = [&out, &folder.path().join("a.svg"), &folder.path().join("case")];
         let [dir, figure, case] = [dir, figure, case].map(|path| path.to_str().unwrap());
-        let commands: [&[&str]; 6] = [
+        let commands: &[&[&str]] = &[
             &["replay", dir, "5"],
             &["replay", dir, "1"],
             &["minimize", dir, "1"],
@@ -103,11 +108,7 @@ fn a_record_that_is_not_that_of_its_sample_is_refused_by_every_reader() {
             &["plot", dir, "1", "-o", figure],
             &["tool", "export", dir, "1", "-o", case],
         ];
-        for command in commands {
-            let output = closecall(command);
-            assert_eq!(code(&output), 3, "{command:?}: {}", stderr(&output));
-            assert!(message(&output).contains(expected), "{command:?}: {}", stderr(&output));
-        }
+        assert_each_refuses(commands, expected);
         assert!(!Path::new(figure).exists() && !Path::new(case).exists());
     }
 }
@@ -191,7 +192,7 @@ fn a_pipe_in_place_of_a_file_is_not_sound_and_its_removal_is_the_repair() {
         fs::remove_file(&path).unwrap();
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
         let listed = problems(&out, 3);
-        assert!(listed.contains(&format!("{name}: it is a named pipe, a socket or a device, and no file")), "{listed}");
+        assert!(listed.contains(&format!("{name}: it is a named pipe, a socket or a device, not a file")), "{listed}");
         assert!(listed.contains("repair: remove it, then resume the campaign: "), "{listed}");
         assert_eq!(code(&campaign(&out, &["--resume"])), 6);
         fs::remove_file(&path).unwrap();

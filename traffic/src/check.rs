@@ -72,20 +72,20 @@ pub enum Problem {
         lanes: u8,
     },
     /// `$name` refers to a parameter that does not exist.
-    #[error("names the parameter `${name}`, which [parameters] does not have; it has {known}{}", hint(name.as_str(), known))]
+    #[error("names the parameter `${name}`, which [parameters] does not have; it has {allowed}{}", hint(name.as_str(), allowed))]
     UnknownParameter {
         /// The name found.
         name: ParameterName,
         /// The names that exist.
-        known: String,
+        allowed: String,
     },
     /// A parameter gives a label where a number is needed, or a number where a label is needed.
-    #[error("names the parameter `${name}`, which gives {found}, where {needed} is needed")]
+    #[error("names the parameter `${name}`, which gives {actual}, where {needed} is needed")]
     WrongKind {
         /// The name found.
         name: ParameterName,
         /// The value of the parameter.
-        found: String,
+        actual: String,
         /// The kind of value that the key needs.
         needed: &'static str,
     },
@@ -98,12 +98,12 @@ pub enum Problem {
         allowed: String,
     },
     /// A name refers to an actor that does not exist.
-    #[error("names the actor `{value}`, but the actors are {known}{}", hint(value, known))]
+    #[error("names the actor `{value}`, but the actors are {allowed}{}", hint(value, allowed))]
     UnknownActor {
         /// The name found.
         value: String,
         /// The names that exist.
-        known: String,
+        allowed: String,
     },
     /// A name occurs twice.
     #[error("is `{value}`, which stands there twice")]

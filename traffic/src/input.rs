@@ -32,8 +32,8 @@ pub fn open(path: &Path) -> io::Result<File> {
     opened.map_err(|error| named(path, error))
 }
 
-/// Returns the error of an input that cannot be read. If the path is `-`, and there is no such
-/// file, the error says that standard input is not read. The kind of the error stays.
+/// Returns the error of an input that cannot be read. If the path is `-` and there is no such file,
+/// the error says that standard input is not read. The kind of the error stays the same.
 pub fn named(path: &Path, error: io::Error) -> io::Error {
     if path.as_os_str() == "-" && error.kind() == ErrorKind::NotFound {
         let message = "there is no file of this name, and standard input is not read here: name a file";
@@ -45,7 +45,7 @@ pub fn named(path: &Path, error: io::Error) -> io::Error {
 /// Opens a file that another program has named, to write at its end.
 ///
 /// # Errors
-/// As of [`open`].
+/// The errors of [`open`].
 pub fn append(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.create(true).append(true);
@@ -56,21 +56,21 @@ pub fn append(path: &Path) -> io::Result<File> {
 /// Opens a file of a campaign's folder with these options.
 ///
 /// # Errors
-/// The error of the system, or [`ErrorKind::InvalidInput`] if something else than a file is at the
-/// path, such as a link.
+/// The error of the system, or [`ErrorKind::InvalidInput`] if the path leads to
+/// anything but a file, such as a link.
 pub fn open_in_folder(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     checked(path, options, true)
 }
 
-/// Reads an input of at most `most` bytes.
+/// Reads an input of at most `max_bytes` bytes.
 ///
 /// # Errors
-/// As of [`open`], and [`ErrorKind::InvalidData`] if it is larger.
-pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+/// The errors of [`open`], and [`ErrorKind::InvalidData`] if the input is larger.
+pub fn read(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most {
-        return Err(io::Error::new(ErrorKind::InvalidData, format!("it is larger than {} MiB", most >> 20)));
+    open(path)?.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes {
+        return Err(io::Error::new(ErrorKind::InvalidData, format!("it is larger than {} MiB", max_bytes >> 20)));
     }
     Ok(bytes)
 }
@@ -78,15 +78,15 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 /// Reads an input as text, without a byte order mark.
 ///
 /// # Errors
-/// As of [`read`], and [`ErrorKind::InvalidData`] if it is not UTF-8.
+/// The errors of [`read`], and [`ErrorKind::InvalidData`] if the input is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     let text = String::from_utf8(read(path, MOST_TEXT_BYTES)?)
         .map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is not text (UTF-8)"))?;
     Ok(without_mark(&text).map(str::to_owned).unwrap_or(text))
 }
 
-/// Returns the text behind a byte order mark, if it begins with one.
-pub fn without_mark(text: &str) -> Option<&str> {
+/// Returns the text after its byte order mark, or `None` if it has none.
+fn without_mark(text: &str) -> Option<&str> {
     text.strip_prefix(BYTE_ORDER_MARK)
 }
 
@@ -100,7 +100,7 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
     // not affected.
     let flags = if is_in_folder { OFlags::NONBLOCK | OFlags::NOFOLLOW } else { OFlags::NONBLOCK };
     let flags = i32::try_from(flags.bits()).map_err(io::Error::other)?;
-    let refused = |kind: &str| io::Error::new(ErrorKind::InvalidInput, format!("it is {kind}, and no file"));
+    let refused = |kind: &str| io::Error::new(ErrorKind::InvalidInput, format!("it is {kind}, not a file"));
     let file = match options.custom_flags(flags).open(path) {
         Ok(file) => file,
         Err(_) if is_in_folder && path.is_symlink() => return Err(refused("a symbolic link")),
@@ -127,7 +127,7 @@ fn special_kind(path: &Path) -> Option<&'static str> {
 #[cfg(not(unix))]
 fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Result<File> {
     if is_in_folder && path.is_symlink() {
-        return Err(io::Error::new(ErrorKind::InvalidInput, "it is a symbolic link, and no file"));
+        return Err(io::Error::new(ErrorKind::InvalidInput, "it is a symbolic link, not a file"));
     }
     options.open(path)
 }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dash_is_said_to_be_no_standard_input() {
+    fn the_error_of_a_missing_file_named_dash_says_that_standard_input_is_not_read() {
         let missing = || io::Error::from(ErrorKind::NotFound);
         let error = named(Path::new("-"), missing());
         assert!(error.to_string().contains("standard input is not read here"), "{error}");
@@ -164,7 +164,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn neither_a_pipe_nor_a_socket_nor_a_device_hangs_and_a_link_is_no_file_of_a_folder() {
+    fn a_pipe_a_socket_and_a_device_are_refused_and_a_link_in_a_folder_too() {
         let folder = tempfile::tempdir().unwrap();
         let [pipe, socket, link, victim] = ["pipe", "socket", "link", "victim"].map(|name| folder.path().join(name));
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());

@@ -83,8 +83,8 @@ impl Parameters {
             Num::Parameter(name) => match self.find(name, key)? {
                 Value::Number(value) => *value,
                 Value::Label(label) => {
-                    let found = format!("the label `{label}`");
-                    let problem = Problem::WrongKind { name: name.clone(), found, needed: "a number" };
+                    let actual = format!("the label `{label}`");
+                    let problem = Problem::WrongKind { name: name.clone(), actual, needed: "a number" };
                     return Err(ConfigError::new(key, problem));
                 }
             },
@@ -120,8 +120,8 @@ impl Parameters {
                 })
             }
             Value::Number(value) => {
-                let found = format!("the number {value}");
-                let problem = Problem::WrongKind { name: name.clone(), found, needed: "a label" };
+                let actual = format!("the number {value}");
+                let problem = Problem::WrongKind { name: name.clone(), actual, needed: "a label" };
                 Err(ConfigError::new(key, problem))
             }
         }
@@ -129,12 +129,12 @@ impl Parameters {
 
     fn find(&self, name: &ParameterName, key: &str) -> Result<&Value, ConfigError> {
         self.get(name).ok_or_else(|| {
-            let known = if self.0.is_empty() {
+            let allowed = if self.0.is_empty() {
                 "none".to_owned()
             } else {
                 self.0.keys().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
             };
-            ConfigError::new(key, Problem::UnknownParameter { name: name.clone(), known })
+            ConfigError::new(key, Problem::UnknownParameter { name: name.clone(), allowed })
         })
     }
 }

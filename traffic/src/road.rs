@@ -322,13 +322,6 @@ impl Road {
         }
     }
 
-    /// Returns the lateral positions of the left and of the right edge of the lanes at `s_m` (m).
-    /// They differ from 0 and from [`right_edge_m`](Self::right_edge_m) where the acceleration lane
-    /// narrows and beyond its end.
-    pub fn edges_at_m(&self, s_m: f64) -> [f64; 2] {
-        [0, self.lanes].map(|number| self.boundary_at_m(number, s_m))
-    }
-
     /// Returns the same road with guard rails on both sides.
     #[must_use]
     pub const fn with_guard_rails(self) -> Self {
@@ -431,19 +424,24 @@ mod tests {
 
     const ENTRY: AccelerationLane = AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };
 
+    /// Returns the lateral positions of the left and of the right edge of the lanes at `s_m` (m).
+    fn edges_at_m(road: &Road, s_m: f64) -> [f64; 2] {
+        [0, road.lanes].map(|number| road.boundary_at_m(number, s_m))
+    }
+
     #[test]
     fn the_acceleration_lane_is_the_lane_opposite_to_the_overtaking_side() {
         let road = Road::straight(3).with_acceleration_lane(ENTRY);
         assert_eq!(road.entry_lane(), Some(Lane(3)));
         assert_eq!(
-            [0.0, 350.0, 380.0, 410.0, 900.0].map(|s_m| road.edges_at_m(s_m)[1]),
+            [0.0, 350.0, 380.0, 410.0, 900.0].map(|s_m| edges_at_m(&road, s_m)[1]),
             [-11.25, -11.25, -9.375, -7.5, -7.5]
         );
         let mirrored = road.mirrored().unwrap();
         assert_eq!(mirrored.entry_lane(), Some(Lane(1)));
-        assert_eq!(mirrored.edges_at_m(380.0), [-1.875, -11.25]);
+        assert_eq!(edges_at_m(&mirrored, 380.0), [-1.875, -11.25]);
         assert_eq!(Road::straight(3).entry_lane(), None);
-        assert_eq!(Road::straight(3).edges_at_m(900.0), [0.0, -11.25]);
+        assert_eq!(edges_at_m(&Road::straight(3), 900.0), [0.0, -11.25]);
         assert_eq!(Road::straight(1).with_acceleration_lane(ENTRY).acceleration_lane(), None);
     }
 
@@ -454,9 +452,9 @@ mod tests {
             let reversed = road.reversed();
             assert_eq!(reversed.entry_lane(), Some(Lane(1)));
             for s_m in [50.0, 360.0, 400.0, 500.0] {
-                let edge_m = road.edges_at_m(s_m)[1];
+                let edge_m = edges_at_m(&road, s_m)[1];
                 let (there_m, expected_m) = road.reversed_position_m(s_m, edge_m);
-                let [left_m, right_m] = reversed.edges_at_m(there_m);
+                let [left_m, right_m] = edges_at_m(&reversed, there_m);
                 assert!((left_m - expected_m).abs() < 1e-9, "{left_m} {expected_m}");
                 assert_eq!(right_m, -11.25);
             }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Returns true if two paths lead to the same file, be it by a link or another folder. The file
 /// need not exist if its folder does.
-pub fn is_same_file(first: &Path, second: &Path) -> bool {
+fn is_same_file(first: &Path, second: &Path) -> bool {
     #[cfg(unix)]
     if let (Ok(first), Ok(second)) = (first.metadata(), second.metadata()) {
         use std::os::unix::fs::MetadataExt as _;

@@ -40,7 +40,7 @@ impl VehicleClass {
     }
 
     /// Returns the typical mass of this class, laden (kg).
-    pub const fn typical_mass_kg(self) -> f64 {
+    const fn typical_mass_kg(self) -> f64 {
         match self {
             Self::Car => 1_600.0,
             Self::Truck => 30_000.0,

@@ -42,10 +42,10 @@ fn headline() -> Scenario {
     nominal(&ScenarioFile::load(&path, &[]).expect("a valid scenario"))
 }
 
-/// Returns the time of a stage (s), and the number of its steps in a run.
+/// A function that returns the time of a stage (s), and the number of its steps in a run.
 type Stage = fn(&Stages) -> (f64, f64);
 
-/// Runs a scenario until a stage has made `steps` steps, and returns the time of these.
+/// Runs a scenario until a stage has made `steps` steps, and returns the time of these steps.
 fn timed(scenario: &Scenario, (controller, sensors): (BuiltIn, SensorMode), steps: u64, stage: Stage) -> Duration {
     let arm = Arm { controller: controller.factory(), sensors: Some(sensors) };
     let (mut time_s, mut done) = (0.0, 0.0);

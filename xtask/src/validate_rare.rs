@@ -124,15 +124,15 @@ impl Total {
     }
 
     fn line(&self, truth: f64) -> String {
-        let found = (self.repetitions - self.without).max(1) as f64;
+        let with_interval = (self.repetitions - self.without).max(1) as f64;
         format!(
             "covers in {:.1} %, {} without an interval, {:.0} runs, 1/{:.0} of plain sampling, relative width {:.2}, mean {:.3} of the truth",
             100.0 * self.coverage(),
             self.without,
             self.runs / self.repetitions as f64,
             self.saving(truth),
-            self.width / found,
-            self.ratio / found,
+            self.width / with_interval,
+            self.ratio / with_interval,
         )
     }
 }
@@ -144,12 +144,12 @@ fn of_function(method: Method, regions: Regions, probability: f64, repetitions: 
     for seed in 0..repetitions {
         let (means, runs) = match method {
             Method::Importance => {
-                let Ok(found) = importance(&mut function, DIMENSIONS, Seed(seed), goal);
-                (found.means, found.runs)
+                let Ok(estimate) = importance(&mut function, DIMENSIONS, Seed(seed), goal);
+                (estimate.means, estimate.runs)
             }
             Method::Subset => {
-                let Ok(found) = subset(&mut function, DIMENSIONS, Seed(seed), goal);
-                (found.means, found.runs)
+                let Ok(estimate) = subset(&mut function, DIMENSIONS, Seed(seed), goal);
+                (estimate.means, estimate.runs)
             }
             // It states no probability.
             Method::Search => (None, 0),

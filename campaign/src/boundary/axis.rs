@@ -30,7 +30,10 @@ pub enum AxisError {
         text: String,
     },
     /// The key has no range, and is no parameter that has one.
-    #[error("`{key}` needs a range, `{key}=LOW..HIGH`: it is no number that the scenario samples{}", listed(sampled))]
+    #[error(
+        "`{key}` needs a range, `{key}=LOW..HIGH`: it is not a number that the scenario samples{}",
+        listed(sampled)
+    )]
     NoRange {
         /// The key.
         key: String,

@@ -26,7 +26,7 @@ use crate::runner::{ArmRun, Work};
 use crate::workers::Samples;
 
 /// The answer of a process that has loaded ONNX Runtime.
-pub(crate) const ONNXRUNTIME_WORKS: &str = "onnxruntime";
+const ONNXRUNTIME_WORKS: &str = "onnxruntime";
 
 /// Number of tracks in the measurement of a control step: dense traffic.
 const COST_TRACKS: usize = 12;

@@ -163,14 +163,14 @@ mod tests {
     const SEEDS: u64 = 40;
 
     fn successes(hides: bool) -> usize {
-        let found = |seed: &u64| search(&mut Narrow { hides }, 8, Seed(*seed), BUDGET).unwrap().has_event;
-        (0..SEEDS).filter(found).count()
+        let has_event = |seed: &u64| search(&mut Narrow { hides }, 8, Seed(*seed), BUDGET).unwrap().has_event;
+        (0..SEEDS).filter(has_event).count()
     }
 
     #[test]
     fn a_region_that_plain_sampling_misses_is_found_in_a_tenth_of_the_runs() {
-        let found = successes(false);
-        assert!(found >= 38, "{found} of {SEEDS}");
+        let hits = successes(false);
+        assert!(hits >= 38, "{hits} of {SEEDS}");
         let plain = |seed: &u64| {
             let mut rng = Seed(*seed).stream("plain", 0);
             (0..10 * BUDGET).any(|_| Narrow { hides: false }.response(&Point::draw(8, &mut rng)).is_event())
@@ -181,8 +181,8 @@ mod tests {
 
     #[test]
     fn without_a_score_that_leads_there_a_search_is_no_better_than_chance() {
-        let found = successes(true);
-        assert!(found <= 4, "{found} of {SEEDS}");
+        let hits = successes(true);
+        assert!(hits <= 4, "{hits} of {SEEDS}");
     }
 
     #[test]

@@ -200,7 +200,7 @@ impl SensitivityPlan {
 
     /// Returns the number of groups of a decomposition that follows a screening: the factors that
     /// are kept, chance, and the rest.
-    pub(super) fn groups_after_screening(&self) -> usize {
+    fn groups_after_screening(&self) -> usize {
         let factors = self.factors.len() - 1;
         if factors > self.top { self.top + 2 } else { factors + 1 }
     }

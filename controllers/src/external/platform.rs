@@ -12,7 +12,7 @@ use crate::external::error::LoadError;
 const MAX_LISTED: usize = 12;
 
 /// Returns the platform of this program.
-pub(crate) fn this_platform() -> String {
+fn this_platform() -> String {
     format!("{ARCH} {OS}")
 }
 
@@ -28,19 +28,20 @@ pub(crate) fn check(path: &Path, needed: &[&str], prefix: &str) -> Result<(), Lo
     let shown = path.display().to_string();
     let bytes =
         input::read(path, MOST_LIBRARY_BYTES).map_err(|source| LoadError::Read { path: shown.clone(), source })?;
-    let not = |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, expected: this_platform() };
-    let file = object::File::parse(&*bytes).map_err(|error| not(format!("it cannot be parsed ({error})")))?;
+    let not_a_library =
+        |reason: String| LoadError::NotALibrary { path: shown.clone(), reason, expected: this_platform() };
+    let file = object::File::parse(&*bytes).map_err(|error| not_a_library(format!("it cannot be parsed ({error})")))?;
     let (arch, os) = (arch(file.architecture()), os(file.format()));
     if arch != ARCH || os != family(OS) {
         let actual = format!("{arch} {os}");
         return Err(LoadError::Platform { path: shown, actual, expected: this_platform() });
     }
     if file.kind() != ObjectKind::Dynamic {
-        return Err(not(format!("it is {}", kind(file.kind()))));
+        return Err(not_a_library(format!("it is {}", kind(file.kind()))));
     }
     let names: Vec<String> = file
         .exports()
-        .map_err(|error| not(format!("its symbols cannot be read ({error})")))?
+        .map_err(|error| not_a_library(format!("its symbols cannot be read ({error})")))?
         .iter()
         .filter_map(|export| std::str::from_utf8(export.name()).ok())
         // Names of Mach-O begin with an underscore.

@@ -35,7 +35,7 @@ fn proactive_gap_m(speed_mps: f64, lead_speed_mps: f64, braking_mps2: f64) -> f6
 }
 
 /// Returns the proactive measure PFS, 0 to 1.
-pub(crate) fn proactive_risk(conflict: &Conflict) -> f64 {
+fn proactive_risk(conflict: &Conflict) -> f64 {
     let (speed_mps, other_mps) = (conflict.speed_mps, conflict.other_speed_mps);
     let safe_m = proactive_gap_m(speed_mps, other_mps, COMFORTABLE_BRAKING_MPS2) + SAFETY_MARGIN_M;
     let unsafe_m = proactive_gap_m(speed_mps, other_mps, HARD_BRAKING_MPS2);
@@ -43,7 +43,7 @@ pub(crate) fn proactive_risk(conflict: &Conflict) -> f64 {
 }
 
 /// Returns the critical measure CFS, 0 to 1.
-pub(crate) fn critical_risk(conflict: &Conflict) -> f64 {
+fn critical_risk(conflict: &Conflict) -> f64 {
     let closing_mps = conflict.closing_mps();
     if closing_mps <= 0.0 {
         return 0.0;

@@ -26,9 +26,9 @@ use crate::aerial::picture::{AerialPicture, AerialScene, render};
 use crate::aerial::random_scene::{Frame, random_scene};
 
 /// The strip in which a road is watched.
-pub const STRIP: Frame = Frame { size_px: [WIDTH_PX, HEIGHT_PX], is_across: true };
+const STRIP: Frame = Frame { size_px: [WIDTH_PX, HEIGHT_PX], is_across: true };
 /// A square for which the camera looks in any direction.
-pub const SQUARE: Frame = Frame { size_px: [512, 512], is_across: false };
+const SQUARE: Frame = Frame { size_px: [512, 512], is_across: false };
 
 /// The options of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

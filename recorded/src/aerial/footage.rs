@@ -35,7 +35,7 @@ impl Footage {
     }
 
     /// Returns columns and rows of the pictures that the detector searches.
-    pub const fn searched_px(self) -> [usize; 2] {
+    const fn searched_px(self) -> [usize; 2] {
         match self {
             Self::Strip => [WIDTH_PX, HEIGHT_PX],
             Self::Published => [searched(PUBLISHED_PX[0]), searched(PUBLISHED_PX[1])],

@@ -28,7 +28,7 @@ pub struct CriterionLoss {
     pub criterion: Criterion,
     /// Number of lane changes in the truth.
     pub wanted: usize,
-    /// Number of these that are found in the tracks.
+    /// Number of lane changes of the truth that are also in the tracks.
     pub found: usize,
     /// Number of lane changes in the tracks that the truth does not have.
     pub invented: usize,
@@ -36,8 +36,8 @@ pub struct CriterionLoss {
     pub crossing_s: Option<f64>,
 }
 
-/// One metric, over the lane changes for which both have a value; times to collision only below 10
-/// s.
+/// One metric, over the lane changes for which both truth and tracks have a value. Times to collision
+/// count only below 10 s.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricLoss {
     /// Name of the metric, which ends with its unit.
@@ -46,9 +46,9 @@ pub struct MetricLoss {
     pub n: usize,
     /// Median of the signed difference to the truth.
     pub bias: Option<f64>,
-    /// Median of its magnitude.
+    /// Median of the magnitude of the difference.
     pub error: Option<f64>,
-    /// Number of lane changes that are critical in one of the two only.
+    /// Number of lane changes that are critical either in the truth or in the tracks, but not in both.
     pub flipped: usize,
 }
 
@@ -107,8 +107,28 @@ struct Sum {
     watched: usize,
     errors_m: Vec<[f64; 2]>,
     id_switches: usize,
-    changes: BTreeMap<Criterion, (usize, usize, usize, Vec<f64>)>,
-    metrics: BTreeMap<usize, (&'static str, Vec<f64>, usize)>,
+    changes: BTreeMap<Criterion, ChangeSum>,
+    /// The metrics, in the order of a lane change.
+    metrics: BTreeMap<usize, MetricSum>,
+}
+
+/// The lane changes of one criterion.
+#[derive(Default)]
+struct ChangeSum {
+    wanted: usize,
+    found: usize,
+    invented: usize,
+    /// Differences of the crossing times (s).
+    crossings_s: Vec<f64>,
+}
+
+/// The values of one metric.
+#[derive(Default)]
+struct MetricSum {
+    name: &'static str,
+    /// Signed differences to the truth.
+    differences: Vec<f64>,
+    flipped: usize,
 }
 
 /// The tracks that follow each track of the truth.
@@ -130,14 +150,14 @@ impl Sum {
             let is_same = |a: &LaneChange, b: &LaneChange| same(a, b, &followers);
             let sum = self.changes.entry(criterion).or_default();
             for change in wanted.iter().filter(|change| is_wanted(change.track_id)) {
-                sum.0 += 1;
+                sum.wanted += 1;
                 if let Some(other) = given.iter().find(|other| is_same(change, other)) {
-                    sum.1 += 1;
-                    sum.3.push((other.crossing_s - change.crossing_s).abs());
+                    sum.found += 1;
+                    sum.crossings_s.push((other.crossing_s - change.crossing_s).abs());
                 }
             }
             let unknown = given.iter().filter(|other| owner(other.track_id).is_some_and(&is_wanted));
-            sum.2 += unknown.filter(|other| !wanted.iter().any(|change| is_same(change, other))).count();
+            sum.invented += unknown.filter(|other| !wanted.iter().any(|change| is_same(change, other))).count();
         }
         let evaluated = |data: &TrajectoryData| criticality(&smooth(data), &Judgement::default());
         let (wanted, given) = (evaluated(truth), evaluated(estimated));
@@ -179,14 +199,14 @@ impl Sum {
 
     fn add_metrics(&mut self, truth: &CriticalLaneChange, estimated: &CriticalLaneChange) {
         for (index, ((name, wanted, _), (_, given, _))) in truth.named().zip(estimated.named()).enumerate() {
-            let entry = self.metrics.entry(index).or_insert((name, Vec::new(), 0));
+            let sum = self.metrics.entry(index).or_insert_with(|| MetricSum { name, ..MetricSum::default() });
             // Almost equal speeds give any time to collision.
             let is_defined = |value: &f64| name != "ttc_s" || *value < ENCOUNTER_HORIZON_S;
             let both = (wanted.value().filter(is_defined), given.value());
             if let (Some(wanted), Some(given)) = both {
-                entry.1.push(given - wanted);
+                sum.differences.push(given - wanted);
             }
-            entry.2 += usize::from(wanted.is_critical() != given.is_critical());
+            sum.flipped += usize::from(wanted.is_critical() != given.is_critical());
         }
     }
 
@@ -207,19 +227,19 @@ impl Sum {
             lane_changes: self
                 .changes
                 .into_iter()
-                .map(|(criterion, (wanted, found, invented, times))| CriterionLoss {
+                .map(|(criterion, ChangeSum { wanted, found, invented, crossings_s })| CriterionLoss {
                     criterion,
                     wanted,
                     found,
                     invented,
-                    crossing_s: middle(times),
+                    crossing_s: middle(crossings_s),
                 })
                 .collect(),
             metrics: self
                 .metrics
                 .into_values()
-                .map(|(metric, differences, flipped)| MetricLoss {
-                    metric,
+                .map(|MetricSum { name, differences, flipped }| MetricLoss {
+                    metric: name,
                     n: differences.len(),
                     bias: middle(differences.clone()),
                     error: middle(differences.into_iter().map(f64::abs).collect()),

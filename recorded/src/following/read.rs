@@ -146,7 +146,7 @@ impl<R: Read> Read for Bounded<R> {
             None => self.of_line + count as u64,
         };
         let fail = |subject: &str, most: u64| {
-            let message = format!("{subject} is longer than {} MiB: it is no file of pairs", most >> 20);
+            let message = format!("{subject} is longer than {} MiB, so this is not a file of pairs", most >> 20);
             Err(std::io::Error::new(std::io::ErrorKind::InvalidData, message))
         };
         match () {

@@ -69,9 +69,9 @@ impl DetectionBasis {
 
     /// Returns why vehicles change their recorded lanes although no lane change was found, of `found`
     /// lane changes.
-    pub fn unexplained_crossings(&self, found: usize) -> Option<String> {
+    pub fn unexplained_crossings(&self, lane_changes: usize) -> Option<String> {
         let by_lane = (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
-        (by_lane && found == 0 && self.recorded_crossings > 0).then(|| {
+        (by_lane && lane_changes == 0 && self.recorded_crossings > 0).then(|| {
             format!(
                 "the recorded lane changes {} times, but no lateral movement carries a vehicle over a marking: the file shows no lane \
                  change that can be followed",

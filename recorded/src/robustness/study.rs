@@ -15,8 +15,8 @@ pub const FAILING_SHARE: f64 = 0.05;
 /// [`FAILING_SHARE`].
 pub const FEWEST_LANE_CHANGES: usize = 20;
 
-/// A track, and the distances to the markings for each of its points; these are empty if they were
-/// not measured.
+/// A track, and the distances to the markings at each of its points. The distances are empty if they
+/// were not measured.
 pub type Measured = (Trajectory, Vec<MarkingDistances>);
 
 /// The levels of the disturbances, and the repetitions and seed of the noise.
@@ -85,10 +85,11 @@ pub struct Experiment {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CriterionCounts {
     /// Number of detected lane changes.
-    pub found: f64,
-    /// Number of lane changes that the criterion detects undisturbed and also detects here.
+    #[serde(rename = "found")]
+    pub detected: f64,
+    /// Number of lane changes that the criterion detects both undisturbed and in this experiment.
     pub again: f64,
-    /// Number of detected lane changes that match none of those.
+    /// Number of detected lane changes that match no lane change detected undisturbed.
     pub invented: f64,
 }
 
@@ -153,23 +154,23 @@ impl Study {
 
     /// Returns all experiments of `setup`: first the experiments with noise, level by level, then
     /// the experiments with an offset.
-    pub fn cases(setup: &Setup) -> Vec<Experiment> {
+    pub fn experiments(setup: &Setup) -> Vec<Experiment> {
         let noise = setup.noise_m_per_sqrt_s.iter().flat_map(|&noise_m_per_sqrt_s| {
             let disturbance = Disturbance { offset_m: 0.0, noise_m_per_sqrt_s };
             (0..setup.repetitions).map(move |number| (disturbance, number))
         });
         let offsets = setup.offset_m.iter();
         let offsets = offsets.map(|&offset_m| (Disturbance { offset_m, noise_m_per_sqrt_s: 0.0 }, 0));
-        let case =
+        let experiment =
             |(disturbance, number)| Experiment { disturbance, repetition: Repetition { seed: setup.seed, number } };
-        noise.chain(offsets).map(case).collect()
+        noise.chain(offsets).map(experiment).collect()
     }
 
     /// Runs one experiment and returns one cell for each criterion.
-    pub fn run(&self, case: &Experiment) -> Vec<CriterionCounts> {
+    pub fn run(&self, experiment: &Experiment) -> Vec<CriterionCounts> {
         let mut cells = vec![CriterionCounts::default(); self.criteria.len()];
         for ((track, distances), undisturbed) in self.tracks.iter().zip(&self.undisturbed) {
-            let (track, distances) = case.disturbance.apply(track, distances, case.repetition);
+            let (track, distances) = experiment.disturbance.apply(track, distances, experiment.repetition);
             let detected = self.detector.detect_by_each(&self.criteria, &track, &distances);
             for (cell, (detected, undisturbed)) in cells.iter_mut().zip(detected.iter().zip(undisturbed)) {
                 cell.count(detected, undisturbed);
@@ -179,7 +180,7 @@ impl Study {
     }
 
     /// Combines the `results` of all experiments of `setup`, which are in the order of
-    /// [`Self::cases`].
+    /// [`Self::experiments`].
     pub fn robustness(&self, setup: &Setup, results: &[Vec<CriterionCounts>]) -> Robustness {
         let (noise, offsets) = results.split_at(results.len() - setup.offset_m.len());
         let repetitions = usize::try_from(setup.repetitions).unwrap_or(usize::MAX).max(1);
@@ -201,7 +202,7 @@ impl CriterionCounts {
     /// changes detected `undisturbed`.
     fn count(&mut self, detected: &[LaneChange], undisturbed: &[LaneChange]) {
         let again = matches(detected, undisturbed);
-        self.found += detected.len() as f64;
+        self.detected += detected.len() as f64;
         self.again += again as f64;
         self.invented += (detected.len() - again) as f64;
     }
@@ -216,7 +217,7 @@ pub struct Robustness {
     pub reference: usize,
     /// Number of lane changes that each criterion detects undisturbed.
     pub undisturbed: Vec<usize>,
-    /// How many of these match a reference lane change.
+    /// Number of undisturbed lane changes that match a reference lane change, for each criterion.
     pub confirmed: Vec<usize>,
     /// Levels, repetitions and seed.
     pub setup: Setup,
@@ -243,7 +244,7 @@ impl Robustness {
         let noise = self.noise.iter_mut().flatten().zip(other.noise.iter().flatten());
         for (row, other) in noise.chain(self.offset.iter_mut().zip(&other.offset)) {
             for (cell, other) in row.iter_mut().zip(other) {
-                cell.found += other.found;
+                cell.detected += other.detected;
                 cell.again += other.again;
                 cell.invented += other.invented;
             }
@@ -257,8 +258,8 @@ impl Robustness {
             let mean_of = |value: fn(&CriterionCounts) -> f64| {
                 repetitions.iter().map(|cells| value(&cells[criterion])).sum::<f64>() / repetitions.len() as f64
             };
-            let (found, again) = (mean_of(|cell| cell.found), mean_of(|cell| cell.again));
-            CriterionCounts { found, again, invented: mean_of(|cell| cell.invented) }
+            let (detected, again) = (mean_of(|cell| cell.detected), mean_of(|cell| cell.again));
+            CriterionCounts { detected, again, invented: mean_of(|cell| cell.invented) }
         };
         let row = |level| (0..self.criteria.len()).map(|criterion| mean(level, criterion)).collect();
         self.noise.iter().map(row).collect()
@@ -298,13 +299,12 @@ mod tests {
 
     #[test]
     fn undisturbed_detections_are_no_failure_and_repetitions_are_kept() {
-        // The recorded lane never changes, so that the reference is empty, but the vehicle moves
-        // over by a lane.
+        // The vehicle moves by one lane, but its recorded lane never changes: the reference is empty.
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         track.points.iter_mut().for_each(|point| point.lane = closecall_traffic::Lane(2));
         let study = Study::new(vec![(track, Vec::new())], &LaneMarkings::default());
         let setup = Setup { noise_m_per_sqrt_s: vec![0.0, 8.0], offset_m: vec![0.0], repetitions: 3, seed: 1 };
-        let results: Vec<_> = Study::cases(&setup).iter().map(|case| study.run(case)).collect();
+        let results: Vec<_> = Study::experiments(&setup).iter().map(|experiment| study.run(experiment)).collect();
         let result = study.robustness(&setup, &results);
         assert_eq!((result.reference, result.undisturbed[0], result.confirmed[0]), (0, 1, 0));
         assert_eq!(result.failing_noise_m_per_sqrt_s(0), Some(8.0));

@@ -35,7 +35,7 @@ struct Channel {
 /// A message of one of the two types.
 struct Message {
     channel: Channel,
-    /// Its number in the channel, from 0.
+    /// Number of the message in the channel, from 0.
     number: usize,
     data: Vec<u8>,
 }
@@ -124,11 +124,11 @@ impl Message {
     }
 }
 
-/// The file, whose poses and topics are known.
+/// The file after a first pass, which has collected the poses and the topics.
 pub(super) struct BagRecording {
     messages: Messages,
     poses: Option<Poses>,
-    /// The LiDAR of each topic; `None` for one that is not needed.
+    /// The LiDAR of each topic, or `None` for a topic that is not needed.
     sensors: BTreeMap<String, Option<usize>>,
 }
 
@@ -136,7 +136,7 @@ impl BagRecording {
     pub(super) fn open(path: &Path, options: &ScanOptions) -> Result<Self, ScanFileError> {
         let origin = Origin::file(path);
         let mut messages = Messages::open(path)?;
-        let (mut poses, mut of_poses, mut topics) = (Vec::new(), None::<String>, Vec::new());
+        let (mut poses, mut odometry_topic, mut topics) = (Vec::new(), None::<String>, Vec::new());
         while let Some(message) = messages.next()? {
             message.check_encoding(&origin)?;
             let topic = &message.channel.topic;
@@ -146,14 +146,14 @@ impl BagRecording {
                 }
                 continue;
             }
-            let first = of_poses.get_or_insert_with(|| topic.clone());
+            let first = odometry_topic.get_or_insert_with(|| topic.clone());
             if first != topic {
                 let text = format!("the topics {first} and {topic} both hold odometry; one is needed");
                 return Err(origin.error(ScanFileProblem::Mcap(text)));
             }
             poses.push(odometry(&message.data).map_err(|problem| message.origin(&origin).error(problem))?);
         }
-        let poses = match of_poses {
+        let poses = match odometry_topic {
             Some(topic) => Some(Poses::new(origin.at(format_args!("topic {topic}")), poses)?),
             None => None,
         };

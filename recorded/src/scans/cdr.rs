@@ -1,16 +1,17 @@
-//! Messages of ROS 2 in CDR, the encoding of DDS (OMG *Common Data Representation*, version 1): what
-//! is needed of `sensor_msgs/msg/PointCloud2` and `nav_msgs/msg/Odometry`.
+//! Reads messages of ROS 2 in CDR, the encoding of DDS (OMG *Common Data Representation*, version 1).
+//! The messages are `sensor_msgs/msg/PointCloud2` and `nav_msgs/msg/Odometry`.
 
 use closecall_traffic::{Time, maths};
 
-use super::cloud::{Cloud, Field, Number};
+use super::cloud::{Cloud, Field, Number, PointBytes};
 use super::error::ScanFileProblem;
 use super::poses::Pose;
 
-/// Bytes before the message: the representation and its options.
+/// Number of bytes before the message: the representation and its options.
 const ENCAPSULATION: usize = 4;
-/// Representation of little-endian CDR, and of big-endian CDR.
+/// Representation of little-endian CDR.
 const LITTLE_ENDIAN: [u8; 2] = [0, 1];
+/// Representation of big-endian CDR.
 const BIG_ENDIAN: [u8; 2] = [0, 0];
 /// Number of elements of a covariance matrix.
 const COVARIANCE: usize = 36;
@@ -18,7 +19,8 @@ const COVARIANCE: usize = 36;
 /// Reads the values of a message one after the other.
 struct Cdr<'a> {
     bytes: &'a [u8],
-    at: usize,
+    /// Index of the next byte.
+    position: usize,
     message: &'static str,
 }
 
@@ -27,7 +29,7 @@ impl<'a> Cdr<'a> {
         let representation = bytes.first_chunk::<2>().copied();
         match representation {
             Some(LITTLE_ENDIAN) if bytes.len() >= ENCAPSULATION => {
-                Ok(Self { bytes: &bytes[ENCAPSULATION..], at: 0, message })
+                Ok(Self { bytes: &bytes[ENCAPSULATION..], position: 0, message })
             }
             Some(BIG_ENDIAN) => Err(ScanFileProblem::BigEndian("the values of the message")),
             _ => Err(ScanFileProblem::Message { message, reason: "it does not begin with 00 01".to_owned() }),
@@ -35,16 +37,16 @@ impl<'a> Cdr<'a> {
     }
 
     fn take(&mut self, length: usize, what: &'static str) -> Result<&'a [u8], ScanFileProblem> {
-        let taken = self.bytes.get(self.at..).and_then(|rest| rest.get(..length));
+        let taken = self.bytes.get(self.position..).and_then(|rest| rest.get(..length));
         let short = || ScanFileProblem::Message { message: self.message, reason: format!("it ends before `{what}`") };
         let taken = taken.ok_or_else(short)?;
-        self.at += length;
+        self.position += length;
         Ok(taken)
     }
 
-    /// Takes a value of some bytes, which begins at a multiple of them.
+    /// Takes a value of `N` bytes. It begins at a multiple of `N` bytes.
     fn aligned<const N: usize>(&mut self, what: &'static str) -> Result<[u8; N], ScanFileProblem> {
-        self.at = self.at.next_multiple_of(N);
+        self.position = self.position.next_multiple_of(N);
         let mut value = [0; N];
         value.copy_from_slice(self.take(N, what)?);
         Ok(value)
@@ -127,7 +129,8 @@ pub(super) fn point_cloud(bytes: &[u8]) -> Result<(Time, Cloud), ScanFileProblem
         true => data.to_vec(),
         false => data.chunks(row_step).flat_map(|row| &row[..width * point_step]).copied().collect(),
     };
-    Ok((stamp, Cloud::of_bytes(&fields, (&points, width * height, point_step))?))
+    let points = PointBytes { bytes: &points, count: width * height, stride: point_step };
+    Ok((stamp, Cloud::of_bytes(&fields, points)?))
 }
 
 /// Returns the pose of an `Odometry`.
@@ -139,7 +142,7 @@ pub(super) fn odometry(bytes: &[u8]) -> Result<Pose, ScanFileProblem> {
     let [x_m, y_m, _] = numbers("pose.pose.position")?;
     let [x, y, z] = numbers("pose.pose.orientation")?;
     let w = cdr.f64("pose.pose.orientation")?;
-    cdr.at = cdr.at.next_multiple_of(size_of::<f64>());
+    cdr.position = cdr.position.next_multiple_of(size_of::<f64>());
     cdr.take(COVARIANCE * size_of::<f64>(), "pose.covariance")?;
     let speed_mps = cdr.f64("twist.twist.linear.x")?;
     for what in ["twist.twist.linear.y", "twist.twist.linear.z", "twist.twist.angular.x", "twist.twist.angular.y"] {

@@ -62,6 +62,16 @@ struct Column {
     values: Vec<f64>,
 }
 
+/// The bytes of points that follow one another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PointBytes<'a> {
+    pub(super) bytes: &'a [u8],
+    /// Number of points.
+    pub(super) count: usize,
+    /// Number of bytes of each point.
+    pub(super) stride: usize,
+}
+
 /// A point cloud, with the fields that are of use.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cloud {
@@ -74,11 +84,9 @@ pub(super) struct Cloud {
 const READ: [&str; 9] = ["x", "y", "z", "intensity", "beam", "time", "timestamp", "offset_ns", "t"];
 
 impl Cloud {
-    /// Returns the points. Each takes `stride` bytes.
-    pub(super) fn of_bytes(
-        fields: &[Field],
-        (bytes, points, stride): (&[u8], usize, usize),
-    ) -> Result<Self, ScanFileProblem> {
+    /// Returns the points that lie in these bytes.
+    pub(super) fn of_bytes(fields: &[Field], points: PointBytes<'_>) -> Result<Self, ScanFileProblem> {
+        let PointBytes { bytes, count: points, stride } = points;
         let size = ScanFileProblem::Size { actual: bytes.len(), points, stride };
         if points.checked_mul(stride) != Some(bytes.len()) {
             return Err(size);

@@ -98,8 +98,8 @@ pub enum ScanFileProblem {
     /// A row has too few or too many fields, or is not text.
     #[error("{0}")]
     Csv(String),
-    /// A field is no number.
-    #[error("`{text}` is no finite number")]
+    /// A field is not a number.
+    #[error("`{text}` is not a finite number")]
     NotANumber {
         /// The text of the field.
         text: String,

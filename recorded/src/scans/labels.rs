@@ -6,12 +6,16 @@ use std::path::Path;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::error::{ScanFileError, ScanFileProblem};
-use super::text_table::read_table;
+use super::text_table::{TableFormat, read_table};
 
 /// Longest time between two labels of a vehicle between which it is interpolated (s).
 const LONGEST_GAP: Time = Time::from_ms(500);
-/// The columns of a table of labels. All are needed.
-const COLUMNS: [&str; 9] = ["time_s", "id", "class", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m"];
+/// A table of labels.
+const FORMAT: TableFormat = TableFormat {
+    columns: &["time_s", "id", "class", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m"],
+    needed: 9,
+    gives: "the labels",
+};
 
 /// A vehicle at one time, in the ego's frame at that time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,13 +49,13 @@ impl Labels {
     /// # Errors
     /// [`ScanFileError`] with the line and the column that is wrong.
     pub fn read(path: &Path) -> Result<Self, ScanFileError> {
-        let rows = read_table(path, &COLUMNS, (COLUMNS.len(), "the labels"))?;
+        let rows = read_table(path, FORMAT)?;
         let mut vehicles: BTreeMap<String, Vec<Label>> = BTreeMap::new();
         for row in &rows {
             let id = row.needed_text(1)?;
             let class = row.needed_text(2)?;
-            let class = VehicleClass::ALL.into_iter().find(|known| known.name() == class).ok_or_else(|| {
-                let names = VehicleClass::ALL.map(|known| format!("`{}`", known.name())).join(", ");
+            let class = VehicleClass::ALL.into_iter().find(|candidate| candidate.name() == class).ok_or_else(|| {
+                let names = VehicleClass::ALL.map(|candidate| format!("`{}`", candidate.name())).join(", ");
                 row.place(2).error(ScanFileProblem::UnknownWord { text: class.to_owned(), allowed: names })
             })?;
             let size = |column: usize| match row.number(column)? {

@@ -1,16 +1,18 @@
 //! The compression LZF of `binary_compressed` PCD files.
 //!
-//! The format is from liblzf by Marc Lehmann: a control byte below 32 introduces that many bytes
-//! and one, and any other a copy of earlier output. Its upper three bits are the length minus 2, or
-//! with 7 in the upper bits the next byte adds to it; the lower five bits and the following byte are
-//! the distance minus 1.
+//! The format is from liblzf by Marc Lehmann. A control byte `c` below 32 introduces `c` + 1 bytes
+//! that are taken as they are. Any other control byte introduces a copy of earlier output:
+//!
+//! - The upper three bits of the control byte are the length of the copy minus 2. If they are 7, the
+//!   next byte is added to the length.
+//! - The lower five bits and the following byte are the distance back to the copied bytes minus 1.
 
 /// Control bytes below this one introduce bytes as they are.
 const LITERAL: u8 = 32;
-/// Length in the upper bits of a control byte from which on another byte adds to it.
+/// Value of the upper bits of a control byte at which the next byte is added to the length.
 const LONG: usize = 7;
 
-/// Returns the data, `size` bytes.
+/// Decompresses data that has `size` bytes.
 pub(super) fn decompress(compressed: &[u8], size: usize) -> Result<Vec<u8>, &'static str> {
     const CUT: &str = "they end too early";
     let mut data: Vec<u8> = Vec::with_capacity(size.min(1 << 28));
@@ -32,7 +34,7 @@ pub(super) fn decompress(compressed: &[u8], size: usize) -> Result<Vec<u8>, &'st
             bytes = rest;
             let distance = (usize::from(control & 31) << 8) + usize::from(low) + 1;
             let from = data.len().checked_sub(distance).ok_or("a copy begins before the data")?;
-            // A copy may overlap what it writes.
+            // A copy may overlap its own output.
             (from..from + length + 2).for_each(|index| data.push(data[index]));
         }
         if data.len() > size {
@@ -48,7 +50,7 @@ mod tests {
 
     #[test]
     fn literals_and_overlapping_copies_are_decompressed() {
-        // `abc`, then nine bytes from three before, then a long copy.
+        // `abc`, then nine bytes copied from a distance of three, then a long copy.
         let compressed = [2, b'a', b'b', b'c', (7 << 5), 0, 2, (7 << 5), 3, 0];
         let data = decompress(&compressed, 24).unwrap();
         assert_eq!(data, [b"abcabcabcabc".as_slice(), &[b'c'; 12]].concat());

@@ -1,5 +1,5 @@
 //! A folder of point clouds in the PCD format, version 0.7, of the Point Cloud Library (*The PCD
-//! (Point Cloud Data) file format*), with an index that gives the time of each.
+//! (Point Cloud Data) file format*), with an index that gives the time of each cloud.
 
 use std::collections::VecDeque;
 use std::io::Read;
@@ -8,17 +8,21 @@ use std::path::{Path, PathBuf};
 use closecall_sensors::lidar::MirrorSide;
 use closecall_traffic::{Time, input};
 
-use super::cloud::{Cloud, Field, Number};
+use super::cloud::{Cloud, Field, Number, PointBytes};
 use super::error::{Origin, ScanFileError, ScanFileProblem};
 use super::options::{ScanOptions, TakenScan, mirror_side};
-use super::text_table::read_table;
+use super::text_table::{TableFormat, read_table};
 
 /// The name of the index in the folder.
 pub const INDEX: &str = "scans.csv";
 /// Largest number of points of a file.
 const MAX_POINTS: usize = 4_000_000;
-const COLUMNS: [&str; 5] = ["file", "time_s", "sensor", "mirror_side", "sensor_x_m"];
-const NEEDED: usize = 2;
+/// The index.
+const INDEX_FORMAT: TableFormat = TableFormat {
+    columns: &["file", "time_s", "sensor", "mirror_side", "sensor_x_m"],
+    needed: 2,
+    gives: "the time at which each scan ends (s), on the clock of the poses",
+};
 
 /// A scan in the index.
 struct Entry {
@@ -42,8 +46,7 @@ impl PcdRecording {
         if !files.any(|file| is_cloud(&file.path())) {
             return Err(origin.error(ScanFileProblem::EmptyFolder));
         }
-        let gives = "the time at which each scan ends (s), on the clock of the poses";
-        let rows = read_table(&folder.join(INDEX), &COLUMNS, (NEEDED, gives))?;
+        let rows = read_table(&folder.join(INDEX), INDEX_FORMAT)?;
         let mut entries = Vec::with_capacity(rows.len());
         for row in &rows {
             let sensor = match row.text(2) {
@@ -94,7 +97,8 @@ struct Header {
     types: Vec<String>,
     counts: Option<Vec<usize>>,
     points: Option<usize>,
-    area: [Option<usize>; 2],
+    width: Option<usize>,
+    height: Option<usize>,
 }
 
 /// Returns the points of a file.
@@ -108,7 +112,7 @@ fn parse(bytes: &[u8]) -> Result<Cloud, ScanFileProblem> {
         };
         let (line, after) = (&rest[..end], &rest[end + 1..]);
         rest = after;
-        let line = std::str::from_utf8(line).map_err(|_| wrong("a line before `DATA` is no text".to_owned()))?.trim();
+        let line = std::str::from_utf8(line).map_err(|_| wrong("a line before `DATA` is not text".to_owned()))?.trim();
         let mut words = line.split_ascii_whitespace();
         let Some(key) = words.next().filter(|key| !key.starts_with('#')) else { continue };
         let values: Vec<&str> = words.collect();
@@ -120,8 +124,8 @@ fn parse(bytes: &[u8]) -> Result<Cloud, ScanFileProblem> {
             "TYPE" => header.types = values.iter().map(ToString::to_string).collect(),
             "COUNT" => header.counts = Some(whole()?),
             "POINTS" => header.points = whole()?.first().copied(),
-            "WIDTH" => header.area[0] = whole()?.first().copied(),
-            "HEIGHT" => header.area[1] = whole()?.first().copied(),
+            "WIDTH" => header.width = whole()?.first().copied(),
+            "HEIGHT" => header.height = whole()?.first().copied(),
             "VIEWPOINT" => {
                 let identity = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
                 let stated: Result<Vec<f64>, _> = values.iter().map(|word| word.parse::<f64>()).collect();
@@ -144,9 +148,13 @@ fn parse(bytes: &[u8]) -> Result<Cloud, ScanFileProblem> {
         "binary" => {
             // Some writers pad the data to whole pages.
             let size = points.saturating_mul(stride);
-            Cloud::of_bytes(&fields, (rest.get(..size).unwrap_or(rest), points, stride))
+            let bytes = rest.get(..size).unwrap_or(rest);
+            Cloud::of_bytes(&fields, PointBytes { bytes, count: points, stride })
         }
-        "binary_compressed" => Cloud::of_bytes(&fields, (&by_points(&fields, points, stride, rest)?, points, stride)),
+        "binary_compressed" => {
+            let bytes = by_points(&fields, points, stride, rest)?;
+            Cloud::of_bytes(&fields, PointBytes { bytes: &bytes, count: points, stride })
+        }
         _ => Err(ScanFileProblem::PcdData(format)),
     }
 }
@@ -192,10 +200,7 @@ impl Header {
     }
 
     fn checked_points(&self) -> Result<usize, String> {
-        let area = match self.area {
-            [Some(width), Some(height)] => width.checked_mul(height),
-            _ => None,
-        };
+        let area = self.width.zip(self.height).and_then(|(width, height)| width.checked_mul(height));
         match (self.points.or(area), area) {
             (None, _) => Err("there is no line `POINTS`".to_owned()),
             (Some(points), Some(area)) if points != area => {
@@ -210,7 +215,7 @@ impl Header {
 }
 
 fn ascii(fields: &[Field], points: usize, text: &[u8]) -> Result<Cloud, ScanFileProblem> {
-    let text = std::str::from_utf8(text).map_err(|_| ScanFileProblem::Points("the points are no text".to_owned()))?;
+    let text = std::str::from_utf8(text).map_err(|_| ScanFileProblem::Points("the points are not text".to_owned()))?;
     let mut rows = Vec::with_capacity(points);
     for (point, line) in text.lines().filter(|line| !line.trim().is_empty()).enumerate() {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
@@ -222,7 +227,7 @@ fn ascii(fields: &[Field], points: usize, text: &[u8]) -> Result<Cloud, ScanFile
         match values {
             Ok(values) => rows.push(values),
             Err(word) => {
-                return Err(ScanFileProblem::Points(format!("point {point} has `{word}`, which is no number")));
+                return Err(ScanFileProblem::Points(format!("point {point} has `{word}`, which is not a number")));
             }
         }
     }
@@ -233,7 +238,8 @@ fn ascii(fields: &[Field], points: usize, text: &[u8]) -> Result<Cloud, ScanFile
     Ok(Cloud::of_rows(fields, &rows))
 }
 
-/// Returns the bytes of compressed data point by point: they are compressed field by field.
+/// Decompresses points. The values lie field by field in the compressed data, and point by point in
+/// the result.
 fn by_points(fields: &[Field], points: usize, stride: usize, data: &[u8]) -> Result<Vec<u8>, ScanFileProblem> {
     const SIZES: usize = 8;
     let size_at =
@@ -305,7 +311,7 @@ mod tests {
             (HEADER.replace("POINTS 2", "POINTS two"), two, "`POINTS two` needs whole numbers"),
             (HEADER.replace("VERSION 0.7", "VIEWPOINT 1 0 0 1 0 0 0"), two, "only `VIEWPOINT 0 0 0 1 0 0 0` is read"),
             (HEADER.to_owned(), "DATA ascii\n1 2 3\n4 5\n", "point 1 has 2 values, but the header states 3"),
-            (HEADER.to_owned(), "DATA ascii\n1 2 3\n4 5 b\n", "point 1 has `b`, which is no number"),
+            (HEADER.to_owned(), "DATA ascii\n1 2 3\n4 5 b\n", "point 1 has `b`, which is not a number"),
             (HEADER.to_owned(), "DATA ascii\n1 2 3\n", "there are 1 points, but the header states 2"),
             (HEADER.to_owned(), "DATA binary\n1234", "have 4 bytes, but 2 points of 12 bytes are stated"),
             (HEADER.to_owned(), "DATA binary_big\n", "`binary_big` is unknown; `ascii`, `binary` and"),

@@ -14,7 +14,7 @@ use std::path::Path;
 use closecall_traffic::{Road, Time, VehicleState, maths};
 
 use super::error::{Origin, ScanFileError, ScanFileProblem};
-use super::text_table::read_table;
+use super::text_table::{TableFormat, read_table};
 
 /// Length of the path whose mean curvature the road has (m; assumption): the distance at which most
 /// vehicles are first tracked.
@@ -23,10 +23,12 @@ const CURVATURE_OVER_M: f64 = 100.0;
 const LEAST_PATH_M: f64 = 10.0;
 /// Longest time between two poses (s): at 1 rad/s² a yaw rate errs by 0.1 rad/s within half of it.
 const LONGEST_GAP: Time = Time::from_ms(500);
-/// The columns of a table of poses: those that are needed come first.
-const COLUMNS: [&str; 9] =
-    ["time_s", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "s_m", "d_m", "heading_rad"];
-const NEEDED: usize = 5;
+/// A table of poses.
+const FORMAT: TableFormat = TableFormat {
+    columns: &["time_s", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "s_m", "d_m", "heading_rad"],
+    needed: 5,
+    gives: "the poses of the ego",
+};
 
 /// The ego at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,7 +64,7 @@ impl Poses {
     /// # Errors
     /// [`ScanFileError`] with the line and the column that is wrong.
     pub fn read(path: &Path) -> Result<Self, ScanFileError> {
-        let rows = read_table(path, &COLUMNS, (NEEDED, "the poses of the ego"))?;
+        let rows = read_table(path, FORMAT)?;
         let mut poses: Vec<Pose> = Vec::with_capacity(rows.len());
         for row in &rows {
             let number = |column: usize| row.number(column);

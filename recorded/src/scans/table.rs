@@ -51,7 +51,7 @@ impl TableRecording {
         let file = input::open(path).map_err(|error| origin.error(error))?;
         let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(ParquetRecordBatchReaderBuilder::build);
         let damaged = |error: parquet::errors::ParquetError| {
-            origin.error(ScanFileProblem::Points(format!("it is no table that can be read: {error}")))
+            origin.error(ScanFileProblem::Points(format!("it cannot be read as a table: {error}")))
         };
         Ok(Self { reader: reader.map_err(damaged)?, origin, batch: None, row: 0, rows_before: 0 })
     }
@@ -76,8 +76,7 @@ impl TableRecording {
         }
     }
 
-    /// Returns the rows of the next scan: those that follow each other with the same sensor and
-    /// time.
+    /// Returns the rows of the next scan: consecutive rows with the same sensor and time.
     fn next_rows(&mut self) -> Result<Option<PointRows>, ScanFileError> {
         let mut scan: Option<PointRows> = None;
         loop {
@@ -88,11 +87,11 @@ impl TableRecording {
             while self.row < rows.count {
                 let row = self.row;
                 let (name, end) = (rows.sensor.as_ref().map(|names| &names[row]), Time::from_s(rows.time_s[row]));
-                let of_scan = scan.get_or_insert_with(|| rows.first(row, self.rows_before + row));
-                if of_scan.name.as_ref() != name || of_scan.points.end != end {
+                let current = scan.get_or_insert_with(|| rows.first(row, self.rows_before + row));
+                if current.name.as_ref() != name || current.points.end != end {
                     return Ok(scan);
                 }
-                rows.append(row, &mut of_scan.points);
+                rows.append(row, &mut current.points);
                 self.row += 1;
             }
         }
@@ -107,7 +106,7 @@ impl TableRecording {
             return Ok(false);
         };
         let damaged = |error: arrow::error::ArrowError| {
-            self.origin.error(ScanFileProblem::Points(format!("it is no table that can be read: {error}")))
+            self.origin.error(ScanFileProblem::Points(format!("it cannot be read as a table: {error}")))
         };
         let batch = batch.map_err(damaged)?;
         self.batch = Some(Rows::of(&batch, self.rows_before).map_err(|problem| self.origin.error(problem))?);

@@ -15,13 +15,20 @@ pub(super) struct TableRow {
     fields: Vec<Option<String>>,
 }
 
-/// Reads a table with the `needed` columns, the first ones of `columns`; the others may be missing,
-/// and columns of other names are ignored.
-pub(super) fn read_table(
-    path: &Path,
-    columns: &'static [&'static str],
-    (needed, gives): (usize, &'static str),
-) -> Result<Vec<TableRow>, ScanFileError> {
+/// The columns of a table, and its purpose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TableFormat {
+    /// The names of the columns. Those that must be there come first.
+    pub(super) columns: &'static [&'static str],
+    /// Number of columns that must be there.
+    pub(super) needed: usize,
+    /// What the table gives, for the message about a missing file.
+    pub(super) gives: &'static str,
+}
+
+/// Reads a table. Columns of other names are ignored.
+pub(super) fn read_table(path: &Path, format: TableFormat) -> Result<Vec<TableRow>, ScanFileError> {
+    let TableFormat { columns, needed, gives } = format;
     let origin = Origin::file(path);
     let list = || columns[..needed].iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     let file = input::open(path).map_err(|error| match error.kind() {

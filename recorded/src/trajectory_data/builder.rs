@@ -30,8 +30,9 @@ pub(super) struct TrackBuilder {
     open: BTreeMap<(u64, Time), Vec<Row>>,
     open_rows: usize,
     max_open_rows: usize,
-    /// The last rows of complete tracks, by vehicle and origin: of the latest track alone if the rows
-    /// arrive by vehicle, and of tracks that end shortly before the latest row if they arrive by time.
+    /// The last rows of complete tracks, by vehicle and origin. If the rows arrive by vehicle, this is
+    /// only the latest track. If the rows arrive by time, these are the tracks that end shortly before
+    /// the latest row.
     ends: BTreeMap<(u64, Time), Row>,
     /// Pieces completed so far, by vehicle number.
     pieces: BTreeMap<u64, Pieces>,
@@ -43,9 +44,9 @@ pub(super) struct TrackBuilder {
 #[derive(Clone, Copy, Debug, Default)]
 struct Pieces {
     count: u64,
-    /// Origin of the latest one.
+    /// Origin of the latest piece.
     origin: Time,
-    /// `true` if the end of the latest one cuts off a lane change.
+    /// `true` if the end of the latest piece cuts off a lane change.
     ends_cut: bool,
 }
 
@@ -187,7 +188,7 @@ impl TrackBuilder {
         let cut = CutEnds::of(rows, self.clock.period);
         *pieces = Pieces { count: piece + 1, origin: first.origin, ends_cut: cut.end };
         if piece > 0 && origin == first.origin {
-            // The piece before does not end where its vehicle leaves the recording.
+            // The previous piece ended at a gap or a jump, not at the edge of the recording.
             self.continuity.edge_crossings -= u64::from(ends_cut);
             self.continuity.split_crossings += u64::from(ends_cut) + u64::from(cut.start);
         } else {
@@ -195,8 +196,8 @@ impl TrackBuilder {
         }
         self.continuity.edge_crossings += u64::from(cut.end);
         if first.number >= PIECE_STRIDE && piece > 0 {
-            // The number already belongs to a piece of a split track, so no number is left for its
-            // own pieces.
+            // The number already belongs to a piece of a split track, so no number is left for the
+            // pieces of this vehicle.
             return Err(ReadError::new(first.line, TrajectoryFileProblem::SplitPiece { track: first.number }));
         }
         let track_id = first.number + piece * PIECE_STRIDE;

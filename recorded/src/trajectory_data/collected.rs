@@ -32,8 +32,8 @@ const MAX_ROWS: usize = 20_000_000;
 /// Shortest step between two frames: shorter ones are the rounding of a file.
 const SHORTEST_STEP: Time = Time::from_ms(1);
 
-/// One in this number of steps is the least share of the most frequent one. If times jitter, no step
-/// is frequent, and the median step counts.
+/// The most frequent step counts if at least one in this number of steps is equal to it. If times
+/// jitter, no step is so frequent, and the median step counts.
 const RARE: usize = 10;
 /// Share of a step by which steps may differ before their mean is taken (-), as in `assemble`.
 const UNEVENNESS: f64 = 0.02;
@@ -49,10 +49,11 @@ const LANE_CHANGE_M: f64 = 1.75;
 /// change lanes.
 const MAX_REFERENCES: usize = 20;
 
-/// Least movement that shows a direction (m), least number of such steps, and the cosine of the
-/// largest angle between a heading and the movement, 30° (-).
+/// Least movement that shows a direction (m).
 const LEAST_STEP_M: f64 = 0.3;
+/// Least number of such movements.
 const LEAST_STEPS: usize = 50;
+/// Cosine of the largest angle between a heading and the movement, 30° (-).
 const MOST_TURNED: f64 = 0.866;
 
 /// Number of lane changes by jumps that may have another cause.
@@ -88,7 +89,7 @@ pub(super) struct CollectedRow {
     pub(super) line: u64,
 }
 
-/// What a reader knows of a file after its last row.
+/// The facts about a file that its reader has collected after the last row.
 #[derive(Debug)]
 pub(super) struct Facts {
     pub(super) layout: Layout,
@@ -166,13 +167,13 @@ impl Collected {
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
         let mut jumps = 0;
-        for of_vehicle in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
-            let Some(&first) = of_vehicle.first() else { continue };
+        for indices in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
+            let Some(&first) = indices.first() else { continue };
             let first_frame = steps(rows[first].time - start, period);
             let mut direction = None;
             let mut before: Option<(Row, u32)> = None;
             let mut visits = 0;
-            for &index in of_vehicle {
+            for &index in indices {
                 let row = &rows[index];
                 let (place, road_index) = match row.position {
                     Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road),
@@ -239,8 +240,8 @@ impl Collected {
     }
 }
 
-/// Returns the number of each vehicle: its name, if all names are numbers, else the order in which
-/// the vehicles appear.
+/// Returns the number of each vehicle. If all names are numbers, it is the name. Otherwise vehicles are
+/// numbered in the order in which they appear.
 fn numbers(names: &[String], notes: &mut Vec<String>) -> Vec<u64> {
     if let Some(stated) = distinct_numbers(names.iter().map(String::as_str), allowed::IDS.1.unsigned_abs()) {
         return stated;
@@ -254,7 +255,7 @@ fn numbers(names: &[String], notes: &mut Vec<String>) -> Vec<u64> {
     (1..=names.len() as u64).collect()
 }
 
-/// Returns the numbers that names state, if all are numbers up to `largest`, and none is there twice.
+/// Returns the names as numbers, if all are numbers up to `largest` and no number occurs twice.
 pub(super) fn distinct_numbers<'n>(names: impl Iterator<Item = &'n str>, largest: u64) -> Option<Vec<u64>> {
     let number = |name: &str| name.parse::<u64>().ok().filter(|number| *number <= largest);
     let numbers: Vec<u64> = names.map(number).collect::<Option<_>>()?;
@@ -267,8 +268,8 @@ fn steps(span: Time, period: Time) -> i64 {
     (span.ns() + period.ns() / 2).div_euclid(period.ns())
 }
 
-/// Returns the time between two frames: the most frequent one between two successive rows of a
-/// vehicle, or the mean of such times, if they are rounded or jitter.
+/// Returns the time between two frames. It is the most frequent time between two successive rows of a
+/// vehicle, or the mean of such times if they are rounded or jitter.
 fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut steps_us: Vec<i64> = Vec::new();
@@ -296,7 +297,7 @@ fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
     Time::from_ns(1_000 * steps_us.iter().sum::<i64>() / steps_us.len().max(1) as i64)
 }
 
-/// Returns the problem of headings that contradict the movements of the vehicles, if most of them do.
+/// Returns a problem if most headings contradict the movements of the vehicles.
 fn against_headings(rows: &[CollectedRow], order: &[usize]) -> Option<TrajectoryFileProblem> {
     let (mut against, mut all) = (0_usize, 0_usize);
     for pair in order.windows(2) {
@@ -363,10 +364,10 @@ fn infer_road(
 /// lanes.
 fn changing_references(road: &InferredRoad, rows: &[CollectedRow], order: &[usize]) -> Vec<u64> {
     let mut reaches_m: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-    for of_vehicle in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
+    for indices in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
         let mut direction = None;
         let (mut left_m, mut right_m) = (f64::NEG_INFINITY, f64::INFINITY);
-        for &index in of_vehicle {
+        for &index in indices {
             let Position::Plane { point, heading_rad, .. } = rows[index].position else { continue };
             direction = direction.or_else(|| road.direction(heading_rad));
             let Some(placed) = direction.and_then(|direction| road.place(direction, point, None)) else { continue };
@@ -402,7 +403,7 @@ pub(super) struct CollectedSource {
 }
 
 impl CollectedSource {
-    /// Adds what vehicles beside each other show of the lanes.
+    /// Adds the order of the lanes that vehicles beside each other show.
     pub(super) fn with_lane_sides(self, lane_sides: LaneSides) -> Self {
         Self { lane_sides, ..self }
     }

@@ -17,8 +17,8 @@ use super::data::MarkingDistances;
 use super::source::{Clock, Row};
 use crate::lane_change::{MIN_DWELL, is_stay};
 
-/// Longest time that is missing between two rows of one track. A car crosses a marking in a few
-/// times as long.
+/// Longest time that may be missing between two rows of one track. A car needs several times as long to
+/// cross a marking.
 pub(super) const LONGEST_BRIDGE: Time = Time::from_ms(500);
 
 /// Longest time without rows after which a vehicle is taken to have changed lanes once (s). A lane
@@ -30,9 +30,10 @@ const LONGEST_HIDDEN: Time = Time::from_ms(10_000);
 const ONE_HIDDEN_IN: u64 = 10;
 
 /// One in this number of lane changes may be cut off where a vehicle enters or leaves the recording
-/// before a result is in doubt, and the least number of them. In windows of US-101, at most one in five
-/// is. An assumption with a plausible range of 2 to 4.
+/// before a result is in doubt. In windows of US-101, at most one in five is cut off. An assumption with
+/// a plausible range of 2 to 4.
 const ONE_CUT_IN: u64 = 3;
+/// Least number of lane changes that are cut off before a result is in doubt.
 const LEAST_CUT: u64 = 3;
 
 /// Excess over the recorded speed that makes a step along the road a jump (m/s). No vehicle is so
@@ -72,24 +73,25 @@ impl FrameClock {
         Self { period: frame_period * frames, frames }
     }
 
-    /// Returns the latest time at which a track goes on that has its last row at `last`.
+    /// Returns the latest time at which a row continues a track whose last row is at `last`.
     pub(super) fn bridged_until(self, last: Time) -> Time {
         last + self.period + LONGEST_BRIDGE.max(Time::from_ns(self.period.ns() / 2))
     }
 }
 
 /// Returns the most frequent difference between the frame numbers of two successive rows of a
-/// vehicle, 1 if no vehicle has two.
+/// vehicle, or 1 if no vehicle has two rows.
 fn usual_step(rows: &[Row]) -> i64 {
     let mut frames: Vec<(u64, Time, i64)> = rows.iter().map(|row| (row.number, row.origin, row.frame)).collect();
     frames.sort_unstable();
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     for pair in frames.windows(2) {
-        if (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1) && pair[1].2 > pair[0].2 {
-            *counts.entry(pair[1].2 - pair[0].2).or_default() += 1;
+        let &[(number, origin, frame), (next_number, next_origin, next_frame)] = pair else { continue };
+        if (number, origin) == (next_number, next_origin) && next_frame > frame {
+            *counts.entry(next_frame - frame).or_default() += 1;
         }
     }
-    // Of equally frequent steps, the smallest.
+    // If several steps are equally frequent, the smallest counts.
     counts.into_iter().rev().max_by_key(|(_, count)| *count).map_or(1, |(step, _)| step)
 }
 
@@ -102,7 +104,7 @@ pub struct Continuity {
     pub pieces: u64,
     /// Gaps that were bridged.
     pub bridged_gaps: u64,
-    /// Frames that were interpolated in them.
+    /// Frames that were interpolated in these gaps.
     pub bridged_frames: u64,
     /// Number of movements that no vehicle makes. Each of them splits a track.
     pub jumps: u64,
@@ -110,10 +112,11 @@ pub struct Continuity {
     pub recorded_crossings: u64,
     /// Changes of the recorded lane in gaps that are not bridged: between two pieces of one vehicle.
     pub hidden_crossings: u64,
-    /// Changes of the recorded lane within a track, so near the gap or the jump at which the track of a
-    /// vehicle is split that no lane change can be followed.
+    /// Changes of the recorded lane within a track that are too near a gap or a jump to be followed. The
+    /// gap or the jump splits the track of the vehicle.
     pub split_crossings: u64,
-    /// The same, near the first or the last row of a vehicle.
+    /// Changes of the recorded lane within a track that are too near the first or the last row of the
+    /// vehicle to be followed.
     pub edge_crossings: u64,
 }
 
@@ -134,7 +137,7 @@ impl Continuity {
         self.recorded_crossings + self.hidden_crossings
     }
 
-    /// Returns the notes on it for a reader of results.
+    /// Returns warnings about gaps, jumps and lost lane changes, for a reader of results.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         let split = self.pieces - self.vehicles;
@@ -188,8 +191,8 @@ impl Continuity {
     }
 }
 
-/// The ends of a track that cut off a lane change: the recorded lane changes there, and the vehicle is
-/// not long enough in the outer lane to stay in it.
+/// The ends of a track that cut off a lane change: the recorded lane changes near the end, and the
+/// track shows the vehicle in the lane beyond the change for less than the shortest stay in a lane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct CutEnds {
     pub(super) start: bool,
@@ -197,7 +200,7 @@ pub(super) struct CutEnds {
 }
 
 impl CutEnds {
-    /// Finds them in the rows of a track. Lane 0 means no lane.
+    /// Finds the cut ends in the rows of a track. Lane 0 means no lane.
     pub(super) fn of(rows: &[Row], period: Time) -> Self {
         let stays: Vec<&[Row]> = rows.chunk_by(|a, b| a.lane == b.lane).collect();
         let is_cut = |outer: &[Row], inner: &[Row]| {
@@ -223,13 +226,14 @@ pub(super) fn is_jump(before: &Row, row: &Row) -> bool {
     exceeds(along_m, JUMP_ALONG_MPS, JUMP_ALONG_M) || across
 }
 
-/// Returns the latest time at which the lane of a vehicle that has its last row at `last` is compared.
+/// Returns the latest time at which a row is compared with the last row of its vehicle, which is at
+/// `last`.
 pub(super) fn compared_until(last: Time) -> Time {
     last + LONGEST_HIDDEN
 }
 
-/// Returns true if a vehicle changes its recorded lane between `before` and the later `row`, between
-/// which its rows are missing. Lane 0 means no lane.
+/// Returns true if a vehicle changes its recorded lane in the gap between `before` and the later `row`.
+/// Lane 0 means no lane.
 pub(super) fn hides_crossing(before: &Row, row: &Row) -> bool {
     let is_other_lane = before.lane != row.lane && before.lane > 0 && row.lane > 0;
     let is_soon = row.time > before.time && row.time <= compared_until(before.time);
@@ -242,7 +246,7 @@ pub(super) fn hides_crossing(before: &Row, row: &Row) -> bool {
 /// long to be bridged.
 ///
 /// The position along the road follows the cubic polynomial with the recorded positions and speeds
-/// at both ends. All else is linear. A frame has the lane of the nearer row.
+/// at both ends. All other values are linear. A frame has the lane of the nearer row.
 pub(super) fn bridge(before: &Row, row: &Row, clock: FrameClock) -> Option<Vec<Row>> {
     let step = row.time - before.time;
     if step > LONGEST_BRIDGE + clock.period {
@@ -290,7 +294,7 @@ mod tests {
         read_beside(0, is_there)
     }
 
-    /// Reads five such vehicles, and as many others in each lane that keep it.
+    /// Reads the vehicles of [`read`], and in each lane `keepers` vehicles that keep their lane.
     fn read_beside(keepers: i32, is_there: impl Fn(i32) -> bool) -> Continuity {
         let mut text = HEADER.to_owned();
         for keeper in 1..=keepers {
@@ -315,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn lane_changes_at_the_ends_of_tracks_are_counted_and_many_are_in_doubt() {
+    fn lane_changes_at_the_ends_of_tracks_are_counted_and_many_cause_doubt() {
         // In a short extract, vehicles that keep their lanes show where these lie.
         let short = read_beside(10, |frame| (46..52).contains(&frame));
         for cut in [read(|frame| frame >= 48), read(|frame| frame < 52), short] {
@@ -353,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn few_lane_changes_at_the_ends_of_tracks_are_in_no_doubt() {
+    fn few_lane_changes_at_the_ends_of_tracks_cause_no_doubt() {
         let edge = |recorded_crossings, edge_crossings| {
             Continuity { recorded_crossings, edge_crossings, ..Continuity::default() }.hides_lane_changes()
         };

@@ -623,7 +623,7 @@ impl TrajectoryFileProblem {
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::ColumnCount { .. } | Self::CutLine => "cut rows",
-            Self::OpenQuote | Self::NotText => "rows that are no text",
+            Self::OpenQuote | Self::NotText => "rows that are not text",
             Self::Value { .. }
             | Self::DecimalComma { .. }
             | Self::NegativeSpeed { .. }

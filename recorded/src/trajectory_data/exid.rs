@@ -15,9 +15,9 @@
 //! changes its lane where `laneChange` is 1, or where its offset from the lane's centre jumps. The
 //! offset also shows whether the positions are mirrored; see `orientation`.
 //!
-//! **inD, rounD.** Their columns are the first ones of exiD's. They record intersections and
-//! roundabouts, which are no roads with lanes: they are read with a warning, or refused if most
-//! vehicles follow no road.
+//! **inD, rounD.** The columns of these data sets are the first columns of exiD. The data sets record
+//! intersections and roundabouts, where vehicles do not follow lanes. The reader gives a warning, and
+//! refuses a file in which most vehicles follow no road.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -146,8 +146,8 @@ impl ExidColumns {
     }
 }
 
-/// Infers the road of a data set from its rows. It ignores unusable rows, because the later reading
-/// of the rows reports them.
+/// Infers the road of a data set from its rows. Unusable rows are ignored here, because the later
+/// reading of the rows reports them.
 ///
 /// # Errors
 /// Fails if the file cannot be read, no vehicle moves, or the vehicles do not follow a road.
@@ -159,8 +159,8 @@ pub(super) fn road_from_traffic(path: &Path) -> Result<InferredRoad, TrajectoryF
             let field = |column: Option<usize>| first_of(column.map_or("", |index| fields.get(line, index)));
             let lane_width_m = number(field(columns.lane_width), "laneWidth", LANE_WIDTH_M).ok();
             let offset_m = columns.offset_m(line, fields);
-            // The flag alone does not tell: in some files it is 0 throughout. The offset from the
-            // centre of the lane jumps where a vehicle enters the next one.
+            // The flag alone is not enough: in some files it is 0 throughout. The offset from the
+            // centre of the lane jumps where a vehicle enters the next lane.
             let before_m = latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
             let least_m = OFFSET_JUMP_SHARE * lane_width_m.unwrap_or(DEFAULT_LANE_WIDTH_M);
             let jumps = before_m.zip(offset_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() > least_m);

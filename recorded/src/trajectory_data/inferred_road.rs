@@ -103,7 +103,7 @@ const AXIS_TURNS: usize = 3;
 pub(super) const MIRRORED: &str = "lanes with higher indices lie further to the right, but the layout counts them from the right: the file is mirrored, \
      so that left is called right, or its traffic drives on the left";
 
-/// The position of one vehicle in one row, and what it says of the lanes.
+/// The position of one vehicle in one row, with the lane that the row states.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pose {
     pub(super) vehicle: u64,
@@ -139,7 +139,7 @@ struct Direction {
     strands: Strands,
     /// For each strand, by how many lanes it lies to the left of the reference line's lane.
     numbers: BTreeMap<Strand, i64>,
-    /// By how much the lanes are to the left of where they usually are.
+    /// Distances along the line by which the lanes lie to the left of their usual position.
     weaving: Departures,
     /// Distances to the left of the line (m) of the edges of the lanes, from left to right.
     edges_m: Vec<f64>,
@@ -149,7 +149,7 @@ struct Direction {
     shift_m: f64,
 }
 
-/// What the rows of one direction show of its lanes.
+/// The lanes of one direction, as its rows show them.
 #[derive(Clone, Debug)]
 struct ObservedLanes {
     observer: LaneObserver,
@@ -177,7 +177,7 @@ impl ObservedLanes {
     }
 }
 
-/// Gives each vehicle the direction of its first row, as when its rows are read.
+/// Gives each vehicle the direction of its first row, as the reader of the rows does.
 #[derive(Clone, Debug, Default)]
 struct KeptDirection {
     latest: Option<(u64, usize)>,
@@ -221,9 +221,9 @@ struct DrivenPath {
 }
 
 impl InferredRoad {
-    /// Infers the road from the rows that `each_row` visits. It is called several times: for the
+    /// Infers the road from the rows that `each_row` visits. `each_row` is called several times: for the
     /// reference lines, for the lanes beside them, and for the comparison with the file. The rows of a
-    /// vehicle have to follow one another.
+    /// vehicle must be consecutive.
     ///
     /// # Errors
     /// The error of `each_row`, or the reason why the traffic shows no road.
@@ -240,7 +240,7 @@ impl InferredRoad {
             changing.extend(leaving);
             (paths, lane_width_m) = best_paths(&mut each_row, &mut changing)?;
         }
-        let directions = paths.into_iter().filter_map(|(_, _, path)| {
+        let directions = paths.into_iter().filter_map(|RatedPath { path, .. }| {
             let points = if path.names_lanes { smoothed(&path.points) } else { path.points };
             let line = ReferenceLine::through(points.into_iter());
             line.length_m()?;
@@ -357,7 +357,7 @@ impl InferredRoad {
             let least = MIN_SHARE * counts.values().sum::<u64>() as f64;
             let used = || counts.iter().filter(|(_, count)| **count as f64 >= least).map(|(lane, _)| *lane);
             let (mut left, mut right) = (used().max().unwrap_or(0).max(0), used().min().unwrap_or(0).min(0));
-            // A named lane next to the others counts, however few vehicles use it. Ramps apart do not.
+            // A named lane next to the others counts, however few vehicles use it. Separate ramps do not count.
             let is_named = |lane: i64| direction.numbers.values().any(|named| *named == lane);
             while is_named(left + 1) {
                 left += 1;
@@ -391,7 +391,7 @@ impl InferredRoad {
         !self.doubts.is_empty()
     }
 
-    /// Returns what a reader of results has to know of the road.
+    /// Returns warnings about the road for a reader of results.
     pub(super) fn warnings(&self) -> Vec<String> {
         let astray = (self.astray > WARNED_SHARE).then(|| {
             format!(
@@ -490,8 +490,8 @@ impl Direction {
 }
 
 /// Returns the middles of the lanes (m to the left of the line), each at least [`LEAST_APART`] beside
-/// its neighbours: vehicles that merge drive in the lane of others. The lane with the most positions
-/// stays where it is.
+/// its neighbours. Vehicles that merge drive in the lane of others, so that measured middles may lie
+/// too close. The lane with the most positions stays where it is.
 fn in_order(fit: &LateralFit<i64>, lane_width_m: f64) -> BTreeMap<i64, f64> {
     let mut middles_m = fit.middles_m.clone();
     let Some((&fullest, _)) = fit.counts.iter().max_by_key(|(_, count)| **count) else { return middles_m };
@@ -536,9 +536,9 @@ fn spread(positions: &LateralPositions<i64>, fit: &LateralFit<i64>, lane_width_m
     })
 }
 
-/// Returns a path without what is shorter than [`SMOOTHED_M`]: twice its moving average less the
-/// average of that, which keeps bends where they are (J. W. Tukey, *Exploratory Data Analysis*, 1977,
-/// "twicing").
+/// Returns a path without the deviations that are shorter than [`SMOOTHED_M`]. The result is twice the
+/// moving average minus the moving average of that average, which keeps bends where they are (J. W.
+/// Tukey, *Exploratory Data Analysis*, 1977, "twicing").
 fn smoothed(points: &[Point]) -> Vec<Point> {
     let mut along_m = vec![0.0];
     for pair in points.windows(2) {
@@ -570,11 +570,34 @@ fn section(s_m: f64) -> i64 {
     section
 }
 
-/// Whether the vehicle of a path stays in its lane, the length of the path (m), and the path.
-type RatedPath = (bool, f64, DrivenPath);
+/// A path, with the properties that decide which path is the best.
+struct RatedPath {
+    stays_in_lane: bool,
+    length_m: f64,
+    path: DrivenPath,
+}
 
-/// Returns the best path of each direction, and the mean lane width that the rows state, or else the
-/// usual one (m). `changing` holds vehicles that change lanes; those whose rows say so are added.
+impl RatedPath {
+    /// Returns true if the vehicle may leave its lane although no row says so.
+    const fn may_leave_its_lane(&self) -> bool {
+        self.stays_in_lane && !self.path.names_lanes
+    }
+}
+
+/// The place at which a vehicle enters a section of a path.
+#[derive(Clone, Copy)]
+struct SectionEntry {
+    vehicle: u64,
+    /// Index of the path.
+    path: usize,
+    section: i64,
+    /// Lateral position (m).
+    d_m: f64,
+}
+
+/// Returns the best path of each direction, and the mean lane width that the rows state (m). If no row
+/// states a lane width, it is the usual one. `changing` holds vehicles that change lanes; those whose
+/// rows say so are added.
 fn best_paths<E>(
     each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
     changing: &mut BTreeSet<u64>,
@@ -615,32 +638,32 @@ fn leaving_their_lanes<E>(
     paths: &[RatedPath],
     lane_width_m: f64,
 ) -> Result<Vec<u64>, E> {
-    if !paths.iter().any(|(stays, _, path)| *stays && !path.names_lanes) {
+    if !paths.iter().any(RatedPath::may_leave_its_lane) {
         return Ok(Vec::new());
     }
     let line = |path: &DrivenPath| ReferenceLine::through(path.points.iter().copied());
-    let lines: Vec<(f64, ReferenceLine)> = paths.iter().map(|(_, _, path)| (path.heading_rad, line(path))).collect();
+    let lines: Vec<(f64, ReferenceLine)> =
+        paths.iter().map(|rated| (rated.path.heading_rad, line(&rated.path))).collect();
     // For each path, the movements of vehicles to its left since the section before (m), by section.
     let mut movements_m: Vec<BTreeMap<i64, Vec<f64>>> = vec![BTreeMap::new(); lines.len()];
-    // Vehicle, path, section, and the lateral position at its start (m).
-    let mut latest: Option<(u64, usize, i64, f64)> = None;
+    let mut latest: Option<SectionEntry> = None;
     each_row(&mut |pose| {
-        let before = latest.filter(|(vehicle, ..)| *vehicle == pose.vehicle);
+        let before = latest.filter(|entry| entry.vehicle == pose.vehicle);
         let agrees = |(heading_rad, _): &(f64, ReferenceLine)| maths::cos(pose.heading_rad - heading_rad);
         let nearest =
             || lines.iter().map(agrees).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index);
-        let Some(index) = before.map(|(_, index, ..)| index).or_else(nearest) else { return };
+        let Some(index) = before.map(|entry| entry.path).or_else(nearest) else { return };
         let projection = lines[index].1.project(pose.point);
         let here = section(projection.s_m);
-        if let Some((_, _, section_before, d_m)) = before {
-            if section_before == here {
+        if let Some(entry) = before {
+            if entry.section == here {
                 return;
             }
-            if section_before + 1 == here {
-                movements_m[index].entry(here).or_default().push(projection.d_m - d_m);
+            if entry.section + 1 == here {
+                movements_m[index].entry(here).or_default().push(projection.d_m - entry.d_m);
             }
         }
-        latest = Some((pose.vehicle, index, here, projection.d_m));
+        latest = Some(SectionEntry { vehicle: pose.vehicle, path: index, section: here, d_m: projection.d_m });
     })?;
     let leaves = |movements_m: BTreeMap<i64, Vec<f64>>| {
         let (mut moved_m, mut least_m, mut most_m) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -650,21 +673,21 @@ fn leaving_their_lanes<E>(
         }
         most_m - least_m > LEAVES_LANE * lane_width_m
     };
-    let judged = paths.iter().zip(movements_m).filter(|((stays, _, path), _)| *stays && !path.names_lanes);
-    Ok(judged.filter_map(|((_, _, path), movements_m)| path.vehicle.filter(|_| leaves(movements_m))).collect())
+    let judged = paths.iter().zip(movements_m).filter(|(rated, _)| rated.may_leave_its_lane());
+    Ok(judged.filter_map(|(rated, movements_m)| rated.path.vehicle.filter(|_| leaves(movements_m))).collect())
 }
 
 /// Keeps the best path of each direction. A path without a lane change is better than a path with
 /// one, and a longer path is better than a shorter path.
 fn keep_best_path(paths: &mut Vec<RatedPath>, path: DrivenPath) {
     let Some(length_m) = ReferenceLine::through(path.points.iter().copied()).length_m() else { return };
-    let stays = !path.changes_lanes;
-    let same = |kept: &&mut RatedPath| maths::cos(kept.2.heading_rad - path.heading_rad) > 0.0;
+    let rated = RatedPath { stays_in_lane: !path.changes_lanes, length_m, path };
+    let same = |kept: &&mut RatedPath| maths::cos(kept.path.heading_rad - rated.path.heading_rad) > 0.0;
     match paths.iter_mut().find(same) {
-        Some(kept) if (stays, length_m) > (kept.0, kept.1) => *kept = (stays, length_m, path),
+        Some(kept) if (rated.stays_in_lane, rated.length_m) > (kept.stays_in_lane, kept.length_m) => *kept = rated,
         Some(_) => {}
         None => {
-            paths.push((stays, length_m, path));
+            paths.push(rated);
             paths.truncate(MAX_DIRECTIONS);
         }
     }

@@ -242,10 +242,10 @@ const EPOCH_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
 fn class_of(kind: &str, unknown: &mut UnknownClasses) -> VehicleClass {
     // The type may be an address, such as the address of a term of an ontology.
     let term = kind.rsplit(['#', '/', ':']).next().unwrap_or(kind);
-    let known = VehicleClass::ALL.into_iter().find(|class| {
+    let class = VehicleClass::ALL.into_iter().find(|class| {
         names::vehicle_type(*class).eq_ignore_ascii_case(term) || class.name().eq_ignore_ascii_case(term)
     });
-    known.unwrap_or_else(|| unknown.nearest_of(term))
+    class.unwrap_or_else(|| unknown.nearest_of(term))
 }
 
 /// Checks a number of a vehicle in a frame.

@@ -244,7 +244,7 @@ impl OpenLabelText {
     }
 
     fn system(&mut self, name: &str) -> Result<u16, String> {
-        let index = self.named_systems.iter().position(|known| known == name).unwrap_or_else(|| {
+        let index = self.named_systems.iter().position(|named| named == name).unwrap_or_else(|| {
             self.named_systems.push(name.to_owned());
             self.named_systems.len() - 1
         });

@@ -143,7 +143,7 @@ impl<R: BufRead> OsiReader<R> {
     }
 
     fn notes(&self) -> Vec<String> {
-        let of_others = || format!("{} moving objects that are no vehicles are left out", self.left_out);
+        let of_others = || format!("{} moving objects that are not vehicles are left out", self.left_out);
         (self.left_out > 0).then(of_others).into_iter().collect()
     }
 }

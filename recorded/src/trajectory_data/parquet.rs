@@ -1,5 +1,5 @@
-//! Parquet files with the columns of a text layout: their rows as the text of that layout, one line
-//! for each row below a header.
+//! Reads a Parquet file that has the columns of a text layout. The file becomes the text of that
+//! layout: a header, and below it one line for each row.
 
 use std::io::{self, BufRead, Read};
 
@@ -16,7 +16,7 @@ use super::source::ReadError;
 /// The first bytes of a Parquet file.
 pub(super) const MAGIC: &[u8] = b"PAR1";
 
-/// Largest size of a file (bytes), which is held in memory.
+/// Largest size of a file (bytes). The whole file is held in memory.
 const MAX_BYTES: u64 = 4 << 30;
 
 /// The rows of a Parquet file as lines of text.
@@ -115,8 +115,8 @@ fn text(field: &Field) -> String {
     }
 }
 
-/// Puts text into quotes if it needs them. Quotes and line ends within it become blanks: no text
-/// layout has them.
+/// Puts text into quotes if it needs them. Quotes and line ends within the text become blanks,
+/// because no text layout allows them.
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace(['"', '\n', '\r'], " "))

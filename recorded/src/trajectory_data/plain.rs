@@ -54,7 +54,7 @@ pub(super) mod allowed {
     pub(in super::super) const LATERAL_M: Bounds = Bounds::closed(-1e3, 1e3);
     pub(in super::super) const SPEED_MPS: Bounds = Bounds::closed(0.0, 150.0);
     /// Speeds along an axis that may point against the direction of travel.
-    pub(in super::super) const SIGNED_SPEED_MPS: Bounds = Bounds::closed(-150.0, 150.0);
+    pub(super) const SIGNED_SPEED_MPS: Bounds = Bounds::closed(-150.0, 150.0);
     pub(in super::super) const ACCELERATION_MPS2: Bounds = Bounds::closed(-1e3, 1e3);
     pub(in super::super) const HEADING_RAD: Bounds = Bounds::closed(-3.2, 3.2);
     pub(in super::super) const PLANE_M: Bounds = Bounds::closed(-1e7, 1e7);

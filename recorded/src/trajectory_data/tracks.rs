@@ -219,7 +219,7 @@ impl<'a> Tracks<'a> {
     }
 
     /// Returns `true` if the frames are too far apart for every lane change to be found.
-    pub fn is_coarse(&self) -> bool {
+    fn is_coarse(&self) -> bool {
         !self.is_simulated && self.period > LONGEST_PERIOD
     }
 

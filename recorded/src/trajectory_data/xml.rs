@@ -158,7 +158,7 @@ impl<R: BufRead> Xml<R> {
 /// Parses the name of an element and its requested attributes.
 fn parse_start_tag(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<StartTag, String> {
     let text = |bytes: &[u8]| {
-        std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "a name is no text in UTF-8".to_owned())
+        std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "a name is not text in UTF-8".to_owned())
     };
     let name = text(start.name().as_ref())?;
     let mut attributes = Vec::new();

@@ -107,17 +107,17 @@ fn counted_from_right(edges: Edges) -> impl Fn(&Seen) -> String {
 }
 
 /// The lane changes in a file: vehicle, direction and crossing (s).
-fn found(data: &TrajectoryData) -> Vec<(u64, Side, f64)> {
+fn lane_changes_of(data: &TrajectoryData) -> Vec<(u64, Side, f64)> {
     let changes = detect(&smooth(data));
     changes.iter().map(|change| (change.vehicle_id, change.direction, change.crossing_s)).collect()
 }
 
 /// Asserts that `data` has the lane changes of the reference, apart from one.
 fn assert_has(data: &TrajectoryData, reference: &[(u64, Side, f64)], case: &str) {
-    let found = found(data);
+    let detected = lane_changes_of(data);
     let is_same = |a: &(u64, Side, f64), b: &(u64, Side, f64)| a.0 == b.0 && a.1 == b.1 && (a.2 - b.2).abs() <= 0.5;
-    let missing = reference.iter().filter(|&listed| !found.iter().any(|other| is_same(listed, other))).count();
-    let invented = found.iter().filter(|&other| !reference.iter().any(|listed| is_same(listed, other))).count();
+    let missing = reference.iter().filter(|&listed| !detected.iter().any(|other| is_same(listed, other))).count();
+    let invented = detected.iter().filter(|&other| !reference.iter().any(|listed| is_same(listed, other))).count();
     assert!(missing <= 1 && invented <= 1, "{case}: {missing} of {} missing, {invented} invented", reference.len());
     assert!(!data.is_in_doubt, "{case}: {:?}", data.warnings());
 }
@@ -155,7 +155,7 @@ fn vehicles_beside_the_middles_of_their_lanes_change_no_lane() {
     for course in [Course::Straight, Course::Bend] {
         for edges in Edges::ALL {
             let data = read_text(sumo(&off_centre(), course, counted_from_right(edges)).as_bytes()).unwrap();
-            let changes: Vec<(u64, Side)> = found(&data).iter().map(|change| (change.0, change.1)).collect();
+            let changes: Vec<(u64, Side)> = lane_changes_of(&data).iter().map(|change| (change.0, change.1)).collect();
             assert_eq!(changes, [(58, Side::Left)], "{course:?}, {edges:?}");
             assert!(!data.is_in_doubt, "{course:?}, {edges:?}: {:?}", data.warnings());
             let assumed = data.notes.iter().any(|note| note.contains("beside each other"));
@@ -174,7 +174,7 @@ fn lanes_that_sumo_counts_from_the_left_are_refused() {
 #[test]
 fn a_single_name_for_all_lanes_is_in_doubt() {
     let data = read_text(sumo(&off_centre(), Course::Straight, |_| "E_0".to_owned()).as_bytes()).unwrap();
-    assert_eq!(found(&data), []);
+    assert_eq!(lane_changes_of(&data), []);
     assert!(data.is_in_doubt);
     let warnings = data.warnings();
     assert!(
@@ -233,12 +233,12 @@ fn vehicles_of_us_101_that_keep_their_named_lane_change_no_lane_in_dense_traffic
         let keepers: Vec<Trajectory> = data.trajectories.into_iter().filter(keeps).collect();
         for edges in Edges::ALL {
             let text = sumo(&rows(&keepers), Course::Straight, counted_from_right(edges));
-            assert_eq!(found(&read_text(text.as_bytes()).unwrap()), [], "{name}, {edges:?}");
+            assert_eq!(lane_changes_of(&read_text(text.as_bytes()).unwrap()), [], "{name}, {edges:?}");
         }
         // One lane alone.
         let lane_4: Vec<Seen> = rows(&keepers).into_iter().filter(|row| row.lane == 4).collect();
         let text = sumo(&lane_4, Course::Straight, counted_from_right(Edges::One));
-        assert_eq!(found(&read_text(text.as_bytes()).unwrap()), [], "{name}, lane 4");
+        assert_eq!(lane_changes_of(&read_text(text.as_bytes()).unwrap()), [], "{name}, lane 4");
     }
 }
 

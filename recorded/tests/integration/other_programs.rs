@@ -327,8 +327,8 @@ fn without_lanes_the_longest_path_of_a_lane_changer_is_no_reference_line() {
     }
     text += "</fcd-export>\n";
     let changes = detect(&smooth(&read_text(text.as_bytes()).unwrap()));
-    let found: Vec<(u64, Side)> = changes.iter().map(|change| (change.track_id, change.direction)).collect();
-    assert_eq!(found, [(13, Side::Left)]);
+    let detected: Vec<(u64, Side)> = changes.iter().map(|change| (change.track_id, change.direction)).collect();
+    assert_eq!(detected, [(13, Side::Left)]);
 }
 
 fn vissim(columns: &str, row: impl Fn(&Drive, f64) -> String) -> String {

@@ -50,7 +50,8 @@ fn logs() -> Vec<(SyntheticLaneChange, Measured)> {
 }
 
 fn studied(study: &Study, setup: &Setup) -> Robustness {
-    let results: Vec<Vec<CriterionCounts>> = Study::cases(setup).iter().map(|case| study.run(case)).collect();
+    let experiments = Study::experiments(setup);
+    let results: Vec<Vec<CriterionCounts>> = experiments.iter().map(|experiment| study.run(experiment)).collect();
     study.robustness(setup, &results)
 }
 
@@ -82,7 +83,7 @@ fn an_offset_makes_only_the_distance_criterion_miss_lane_changes() {
     assert_eq!(result.criteria, [Criterion::Peak, Criterion::Distance, Criterion::Gradient]);
     let [left, none, right] = &result.offset[..] else { panic!("three offsets") };
     for cell in none {
-        assert_eq!((cell.again, cell.found, cell.invented), (20.0, 20.0, 0.0));
+        assert_eq!((cell.again, cell.detected, cell.invented), (20.0, 20.0, 0.0));
     }
     for cells in [left, right] {
         assert_eq!([cells[0].again, cells[2].again], [20.0, 20.0]);

@@ -44,9 +44,9 @@ fn a_long_file_is_smoothed_while_it_is_read() {
         assert_eq!(smoothed.tracks, streamed.data.tracks);
         assert_eq!(smoothed.markings, streamed.data.markings);
         assert_eq!(count_flaws(&whole).tracks, streamed.flaws.tracks);
-        let found = criticality(&streamed.data, &Judgement::default());
-        assert!(found.len() > 700, "{}", found.len());
-        assert_eq!(found.len(), criticality(&smoothed, &Judgement::default()).len());
+        let evaluated = criticality(&streamed.data, &Judgement::default());
+        assert!(evaluated.len() > 700, "{}", evaluated.len());
+        assert_eq!(evaluated.len(), criticality(&smoothed, &Judgement::default()).len());
     }
 }
 

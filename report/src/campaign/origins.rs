@@ -118,7 +118,7 @@ impl Origins {
         let refused: Vec<String> = refused.iter().map(|(reason, count)| format!("{reason} ({count})")).collect();
         let refused = match refused.is_empty() {
             true => String::new(),
-            false => format!("; lane changes that are no encounter: {}", refused.join("; ")),
+            false => format!("; lane changes that are not encounters: {}", refused.join("; ")),
         };
         let (approaches, encounters) = (self.approaches, self.encounters.len());
         format!(
@@ -235,7 +235,7 @@ pub(super) fn section(findings: &Findings<'_>) -> Markup {
         (files_table(&origins))
         @if !origins.refused.is_empty() {
             p {
-                "Lane changes that are no encounter: "
+                "Lane changes that are not encounters: "
                 @for (number, (reason, count)) in origins.refused.iter().enumerate() {
                     @if number > 0 { "; " } (reason) " (" (count) ")"
                 }
@@ -381,7 +381,7 @@ mod tests {
         };
         assert_eq!(
             chosen.choice_sentence(),
-            "of 33 lane changes, 18 overtake a vehicle, and 2 became scenarios; lane changes that are no encounter: too slow (10); \
+            "of 33 lane changes, 18 overtake a vehicle, and 2 became scenarios; lane changes that are not encounters: too slow (10); \
              no vehicle ahead (5)"
         );
         let all = Origins { refused: BTreeMap::new(), ..chosen };

@@ -82,7 +82,7 @@ pub fn parameter_columns<'a>(
 }
 
 /// The key under which the metadata of the file holds the manifest, as JSON.
-pub const MANIFEST_KEY: &str = "closecall:manifest";
+const MANIFEST_KEY: &str = "closecall:manifest";
 
 /// Writes the table, with the `manifest` of the campaign in its metadata. The rows are encoded in
 /// batches, so that memory is bounded.

@@ -1,4 +1,4 @@
-//! Distributions: of each margin in each arm, and of each sampled value by the fate of the samples.
+//! Draws distributions: of each margin, by arm, and of each sampled value, by the fate of the sample.
 
 use std::io;
 
@@ -18,7 +18,7 @@ const AREA_OPACITY: f64 = 0.18;
 /// White space on both sides of a bar, as a share of its width.
 const BAR_GAP: f64 = 0.04;
 
-/// Draws the distribution of one margin, all arms over each other.
+/// Draws the distributions of one margin in all arms, one over the other.
 pub(crate) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::Result<Markup> {
     let most = arms.iter().flat_map(|bins| bins.counts).max().unwrap_or(0);
     inline(SMALL_PX, |canvas| {
@@ -81,7 +81,7 @@ pub(crate) fn coverage(axis: &Axis, counts: &[[u64; Fate::ALL.len()]; CELLS]) ->
 
 /// Returns the vertical axis of a distribution, from zero to the largest count.
 fn count_axis(most: u64) -> ChartAxis<'static> {
-    // plotters may put a label between two counts: it stays empty.
+    // plotters may place a label between two counts. Such a label stays empty.
     let text = |count: &f64| if count.fract() == 0.0 { format!("{count:.0}") } else { String::new() };
     let range = 0.0..most.max(1) as f64 * HEADROOM;
     ChartAxis { name: "", range, labels: 4, text: Box::new(text), has_grid: true }
@@ -97,7 +97,7 @@ pub(super) fn parameter_axis<'a>(axis: &'a Axis, name: &'a str, labels: usize) -
     ChartAxis { name, range: low..high, labels, text, has_grid: false }
 }
 
-/// Returns the label that stands at a position of the axis; empty if the position is between two
+/// Returns the label at a position of the axis, or an empty text if the position lies between two
 /// labels.
 fn label_near(labels: &[String], position: f64) -> String {
     let nearest = position.round();

@@ -1,4 +1,4 @@
-//! The outcome over two parameters.
+//! Draws the map of the outcomes over two parameters.
 
 use std::io;
 
@@ -12,8 +12,9 @@ use crate::units::labelled;
 
 /// Opacity of a cell in which every sample has a collision.
 const LARGEST_OPACITY: f64 = 0.45;
-/// Radius of the points (px): samples without a collision are smaller.
+/// Radius of the point of a sample with a collision (px).
 const POINT_PX: i32 = 3;
+/// Radius of the point of a sample without a collision (px).
 const SMALL_POINT_PX: i32 = 2;
 /// Width over which the points at one label are spread, in steps between labels.
 const SPREAD: f64 = 0.6;

@@ -555,7 +555,7 @@ pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bo
             _ => false,
         });
         if refers_to_missing {
-            list.push(format!("{id}: an event at a lane change that is no action of this file"));
+            list.push(format!("{id}: an event at a lane change that is not an action of this file"));
         }
     }
     if are_named {

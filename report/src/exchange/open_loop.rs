@@ -67,7 +67,7 @@ fn position(scenario: &Scenario, index: usize, state: &VehicleState) -> Element 
 }
 
 /// Returns the position of the rear axle in the plane. The centre of the box lies ahead of it.
-pub(super) fn world_position(scenario: &Scenario, index: usize, state: &VehicleState) -> Element {
+fn world_position(scenario: &Scenario, index: usize, state: &VehicleState) -> Element {
     let pose = scenario.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
     let (sin, cos) = maths::sin_cos(pose.yaw_rad);
     let ahead_m = axle_to_centre_m(&scenario.actors[index].vehicle.dimensions);

@@ -11,14 +11,14 @@ pub fn anchor(anchor: &Anchor) -> Value {
         let mover = anchor
             .mover(quantity)
             .map(|(row, [own, moved])| json!({ "setting": row.setting, "from": own, "to": moved }));
-        let found = json!({
+        let values = json!({
             "published_ratio": quantity.published(),
             "ensemble_range": anchor.range(quantity),
             "covered": anchor.covers(quantity),
             "members_whose_interval_contains_it": anchor.agreeing(quantity).collect::<Vec<_>>(),
             "moved_most_by": mover,
         });
-        (quantity.key().to_owned(), found)
+        (quantity.key().to_owned(), values)
     };
     json!({
         "scenario": anchor.scenario,

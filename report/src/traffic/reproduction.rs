@@ -26,9 +26,9 @@ use serde::Serialize;
 use super::sampling::{SampledRun, StepError, StepRun, run_step};
 
 /// Largest relative error along the road (-); see the module documentation.
-pub const LARGEST_RELATIVE_ERROR: f64 = 0.29;
+const LARGEST_RELATIVE_ERROR: f64 = 0.29;
 /// Largest root mean square error across the road (m); see the module documentation.
-pub const LARGEST_ACROSS_M: f64 = 0.28;
+const LARGEST_ACROSS_M: f64 = 0.28;
 
 /// Published gap at standstill (m) and time headway (s) of Wiedemann 99.
 const PUBLISHED_CC0_M: f64 = 1.5;
@@ -100,7 +100,7 @@ impl Reproduction {
     }
 
     /// Returns whether step 0 reproduces the recording within the bounds.
-    pub fn is_within_bounds(&self) -> bool {
+    fn is_within_bounds(&self) -> bool {
         self.relative_error <= LARGEST_RELATIVE_ERROR
             && self.across_rms_m <= LARGEST_ACROSS_M
             && self.crosses_later_s.is_some()

@@ -139,7 +139,7 @@ impl SampledRun {
 
 impl SampledRun {
     /// Returns the largest distances along and across the road from another run at the same time (m).
-    pub(super) fn furthest_from(&self, other: &Self) -> (f64, f64) {
+    fn furthest_from(&self, other: &Self) -> (f64, f64) {
         let mut furthest = (0.0_f64, 0.0_f64);
         let mut others = self.positions.iter().peekable();
         for (time, s_m, d_m) in &other.positions {

@@ -150,8 +150,8 @@ fn item(name: CoverageName, config: &ItemConfig, space: &ParameterSpace) -> Resu
     match (&config.parameter, &config.measure, config.odd) {
         (Some(parameter), None, None) => {
             let Some(entry) = space.get(parameter) else {
-                let known = space.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-                let problem = Problem::UnknownParameter { name: parameter.clone(), known };
+                let allowed = space.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+                let problem = Problem::UnknownParameter { name: parameter.clone(), allowed };
                 return Err(ConfigError::new("parameter", problem));
             };
             let labels = match entry.distribution.nominal() {

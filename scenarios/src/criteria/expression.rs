@@ -360,8 +360,8 @@ fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
         _ => match name.strip_prefix('p').and_then(|percent| percent.parse::<f64>().ok()) {
             Some(percent) if (0.0..=100.0).contains(&percent) => Aggregate::Percentile(percent),
             _ => {
-                let known = "count, share, lower, upper, min, max, mean, sum, p0 to p100, and coverage";
-                return Err(format!("`{name}` is not an aggregate; there are {known}"));
+                let aggregates = "count, share, lower, upper, min, max, mean, sum, p0 to p100, and coverage";
+                return Err(format!("`{name}` is not an aggregate; there are {aggregates}"));
             }
         },
     })

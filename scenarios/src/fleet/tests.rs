@@ -32,7 +32,7 @@ fn wrong_fleets_are_refused_with_key_and_range() {
     for (from, to, message) in [
         ("clean = 0.85", "clean = 0.95", "plates: the shares add up to 1.100"),
         ("clean = 0.85", "clean = nan", "plates: the shares"),
-        ("saloon = 0.067", "coach = 0.067", "car.shapes: `coach` is no shape of a car"),
+        ("saloon = 0.067", "coach = 0.067", "car.shapes: `coach` is not a shape of a car"),
         ("[0.04, 0.08]", "[0.08, 0.04]", "car.paints: the reflectivity of `black` is 0.08 to 0.04"),
         ("[0.04, 0.08]", "[0.0, 0.04]", "numbers above 0 and up to 1"),
         ("share = 0.330", "share = -0.330", "car.paints: the shares"),

@@ -94,7 +94,7 @@ impl Storyboard<'_> {
                     (Err(_), "equalTo") => Ok(value == limit),
                     (Err(_), "notEqualTo") => Ok(value != limit),
                     (Err(_), _) => {
-                        let message = format!("`rule` is `{rule}`, and `{value}` is no number: it has no order");
+                        let message = format!("`rule` is `{rule}`, and `{value}` is not a number and so has no order");
                         Err(reader.error(node, message))
                     }
                 }

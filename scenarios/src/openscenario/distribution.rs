@@ -162,7 +162,7 @@ fn values(reader: &Reader, node: &Node) -> Result<Vec<Given>, ImportError> {
             .all("Element")
             .map(|element| match element.raw("weight") {
                 None => reader.text(element, "value").map(&given),
-                Some(_) => Err(reader.error(element, "`weight` is no attribute of a value of a `DistributionSet`")),
+                Some(_) => Err(reader.error(element, "`weight` is not an attribute of a value of a `DistributionSet`")),
             })
             .collect(),
         "DistributionRange" => {
@@ -243,7 +243,7 @@ mod tests {
                     "<Deterministic>{}</Deterministic>",
                     single("a", "<DistributionSet><Element value=\"1\" weight=\"1\"/></DistributionSet>")
                 ),
-                "`Element`: `weight` is no attribute",
+                "`Element`: `weight` is not an attribute",
             ),
             (format!("<Deterministic>{}</Deterministic>", range("0", "2")), "in steps of 0"),
             (format!("<Deterministic>{}</Deterministic>", range("-1", "2")), "in steps of -1"),

@@ -141,7 +141,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
         let line_of_event = if matches!(event, Ok(Event::Start(_))) { begins } else { line };
         let fail = |message: String| Err(ImportError { path: path.to_owned(), line: line_of_event, element, message });
         match event {
-            Err(error) => return fail(format!("it is no XML document: {error}")),
+            Err(error) => return fail(format!("it is not an XML document: {error}")),
             Ok(Event::DocType(_)) => return fail("a document type declaration is not allowed".to_owned()),
             Ok(Event::Start(start)) => {
                 count += 1;
@@ -155,7 +155,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
             }
             Ok(Event::Text(part)) => match (part.decode(), open.last_mut()) {
                 (Ok(part), Some(node)) => node.text.push_str(&part),
-                (Err(error), _) => return fail(format!("it is no text: {error}")),
+                (Err(error), _) => return fail(format!("it is not text: {error}")),
                 (Ok(_), None) => {}
             },
             Ok(Event::CData(part)) => {

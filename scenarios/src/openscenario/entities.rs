@@ -45,8 +45,10 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError
                 "CatalogReference" => vehicle = Some(of_catalog(reader, (root, &mut catalogs), child)?),
                 "ObjectController" => entities.controlled.push(name.clone()),
                 _ => {
-                    return Err(reader
-                        .error(child, format!("`{name}` is no vehicle: a scenario has cars, trucks and motorcycles")));
+                    return Err(reader.error(
+                        child,
+                        format!("`{name}` is not a vehicle: a scenario has cars, trucks and motorcycles"),
+                    ));
                 }
             }
         }
@@ -157,7 +159,7 @@ fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
         "car" | "van" => "car",
         "truck" | "bus" | "semitrailer" => "truck",
         "motorbike" => "motorcycle",
-        _ => return Err(reader.error(node, format!("a `{category}` is no car, truck or motorcycle"))),
+        _ => return Err(reader.error(node, format!("a `{category}` is not a car, truck or motorcycle"))),
     };
     let size = reader.child(node, &["BoundingBox", "Dimensions"])?;
     let length_m = within(reader, size, ("length", Dimensions::LENGTH_M, "m"))?;

@@ -139,7 +139,7 @@ mod tests {
         format!("<laneSection s=\"{s_m}\"><{side}>{}</{side}></laneSection>", lanes.concat())
     }
 
-    fn found(side: &str, sections: &[String]) -> Option<(i32, [f64; 3])> {
+    fn entry_lane_of(side: &str, sections: &[String]) -> Option<(i32, [f64; 3])> {
         let text = format!("<lanes>{}</lanes>", sections.concat());
         let lane = find(&parse(Path::new("road.xodr"), &text).unwrap(), side, 1_000.0)?;
         assert_eq!(lane.width_m, 3.5);
@@ -162,17 +162,17 @@ mod tests {
             };
             // From the start of the road on: the marking opens 200 m behind it.
             let ramp = [of(Some(FULL), 0.0), of(Some(FALLS), 400.0), of(None, 470.0)];
-            assert_eq!(found(side, &ramp), Some((3 * sign, [200.0, 400.0, 470.0])));
+            assert_eq!(entry_lane_of(side, &ramp), Some((3 * sign, [200.0, 400.0, 470.0])));
             // It begins within the road: it rises to its width, and the marking opens behind that.
             let begins = [of(None, 0.0), of(Some(RISES), 100.0), of(Some(FALLS), 400.0), of(None, 470.0)];
-            assert_eq!(found(side, &begins), Some((3 * sign, [300.0, 400.0, 470.0])));
+            assert_eq!(entry_lane_of(side, &begins), Some((3 * sign, [300.0, 400.0, 470.0])));
             // No lane that begins or ends, a lane without an end, and one that ends at once.
-            assert_eq!(found(side, &[of(Some(FULL), 0.0), of(Some(FULL), 400.0)]), None);
-            assert_eq!(found(side, &[of(None, 0.0), of(Some(FULL), 400.0)]), None);
-            assert_eq!(found(side, &[of(Some(FULL), 0.0), of(None, 400.0)]), None);
+            assert_eq!(entry_lane_of(side, &[of(Some(FULL), 0.0), of(Some(FULL), 400.0)]), None);
+            assert_eq!(entry_lane_of(side, &[of(None, 0.0), of(Some(FULL), 400.0)]), None);
+            assert_eq!(entry_lane_of(side, &[of(Some(FULL), 0.0), of(None, 400.0)]), None);
             // A lane that ends between others.
             let between = section(0.0, &[(sign, FULL), (2 * sign, FALLS), (3 * sign, FULL)]);
-            assert_eq!(found(side, &[between, section(70.0, &[(sign, FULL), (3 * sign, FULL)])]), None);
+            assert_eq!(entry_lane_of(side, &[between, section(70.0, &[(sign, FULL), (3 * sign, FULL)])]), None);
         }
     }
 }

@@ -160,7 +160,7 @@ impl Parser<'_> {
             ("max", [a, b]) => Ok(a.max(*b)),
             ("min", [a, b]) => Ok(a.min(*b)),
             ("pow", [a, b]) => Ok(maths::exp(b * maths::ln(*a))),
-            _ => Err(format!("`{word}` with {} arguments is no function of an expression", arguments.len())),
+            _ => Err(format!("`{word}` with {} arguments is not a function of an expression", arguments.len())),
         }
     }
 

@@ -143,7 +143,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportFa
         return of_values(&reader, &root, options);
     }
     if options.value_set.is_some() {
-        return Err(reader.error(&root, "it is a scenario, and no file of values: it has no value sets").into());
+        return Err(reader.error(&root, "it is a scenario, not a file of values: it has no value sets").into());
     }
     import_scenario(&reader, root, options)
 }
@@ -261,7 +261,7 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
         return Err(reader.error(header, message));
     }
     match root.child("Catalog") {
-        Some(catalog) => Err(reader.error(catalog, "a catalogue is no scenario")),
+        Some(catalog) => Err(reader.error(catalog, "a catalogue is not a scenario")),
         None => Ok(()),
     }
 }

@@ -141,7 +141,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
             UsedRoad::Lane { lane, reader, position, .. } => {
                 let named = if lanes.is_empty() { "none".to_owned() } else { lanes.join(", ") };
                 let place = format!("on the {side} of road {road_id} in {}", path.display());
-                reader.error(position, format!("lane {lane} is no driving lane {place}, only {named}"))
+                reader.error(position, format!("lane {lane} is not a driving lane {place}, only {named}"))
             }
             UsedRoad::Only => along.error(path, "none of its lanes is a driving lane with a width of 2.5 to 5 m"),
         });

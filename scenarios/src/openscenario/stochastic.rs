@@ -137,7 +137,7 @@ fn fixed(value: &str, is_label: bool) -> Result<Value, String> {
     }
     match value.trim().parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(Value::Number(number)),
-        _ => Err(format!("`{value}` is no number, and the parameter of the scenario takes numbers")),
+        _ => Err(format!("`{value}` is not a number, and the parameter of the scenario takes numbers")),
     }
 }
 
@@ -516,7 +516,9 @@ mod tests {
         assert_eq!(labels, BTreeMap::from([("2".to_owned(), 1.0), ("5".to_owned(), 2.0)]));
         let uniform = marginal(&format!("<UniformDistribution>{LIMITS}</UniformDistribution>")).unwrap();
         assert!(uniform.config(true).unwrap_err().contains("takes labels"));
-        assert!(set("<Element value=\"van\" weight=\"1\"/>").config(false).unwrap_err().contains("`van` is no number"));
+        assert!(
+            set("<Element value=\"van\" weight=\"1\"/>").config(false).unwrap_err().contains("`van` is not a number")
+        );
     }
 
     #[test]

@@ -619,7 +619,7 @@ impl<'a> Storyboard<'a> {
             [from, to].map(|lane| self.road.lanes.iter().position(|candidate| *candidate == lane));
         let Some((from_index, to_index)) = from_index.zip(to_index) else {
             let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
-            let message = format!("lane {to} is no driving lane along the road, only {}", lanes.join(", "));
+            let message = format!("lane {to} is not a driving lane along the road, only {}", lanes.join(", "));
             return Err(self.reader.error(target, message));
         };
         if from_index == to_index && self.vehicles[actor].offset_m != 0.0 {
@@ -960,7 +960,7 @@ impl<'a> Storyboard<'a> {
         };
         if !self.road.lanes.contains(&lane) {
             let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
-            let message = format!("lane {lane} is no driving lane along the road, only {}", lanes.join(", "));
+            let message = format!("lane {lane} is not a driving lane along the road, only {}", lanes.join(", "));
             // The other vehicle may not be placed yet.
             let is_relative = !matches!(node.name.as_str(), "LanePosition" | "WorldPosition");
             return if round == 0 && is_relative { Ok(()) } else { Err(reader.error(node, message)) };

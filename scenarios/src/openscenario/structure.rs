@@ -95,7 +95,7 @@ impl Checker<'_> {
             let Some(allowed) = element.attributes.iter().find(|allowed| allowed.name == attribute.key) else {
                 let names: Vec<_> = element.attributes.iter().map(|allowed| allowed.name).collect();
                 let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-                let message = format!("`{}` is no attribute of it, which can have {names}", attribute.key);
+                let message = format!("`{}` is not an attribute of it, which can have {names}", attribute.key);
                 return Err(node.error(self.path, message));
             };
             let value = allowed.checked(&attribute.value, values).map_err(|message| node.error(self.path, message))?;
@@ -257,12 +257,12 @@ mod tests {
         let story = |story: &str| with_declarations(declaration, story);
         let declared = |declarations: &str| with_declarations(declarations, "");
         for (text, word) in [
-            (declared("<ParameterDeclaration title=\"a\"/>"), "`title` is no attribute of it, which can have name"),
+            (declared("<ParameterDeclaration title=\"a\"/>"), "`title` is not an attribute of it, which can have name"),
             (declared("<ParameterDeclaration name=\"a\" value=\"1\"/>"), "it needs `parameterType`"),
             (declared(&declaration.replace("double", "real")), "`parameterType` is `real`; one of boolean"),
             (declared(&declaration.replace('5', "five")), "the double `a`: `value` is `five`"),
             (declared(&declaration.repeat(2)), "`a` is declared before it already"),
-            (story("<Story foo:name=\"a\"/>"), "`foo:name` is no attribute of it"),
+            (story("<Story foo:name=\"a\"/>"), "`foo:name` is not an attribute of it"),
             (story("<Story name=\"a\">text</Story>"), "no text is allowed"),
             (story("<Init/><Init/>"), "`Init`: `Storyboard` has one already"),
             (story("<Story name=\"$b\"/>"), "there is no parameter `b`, only a"),

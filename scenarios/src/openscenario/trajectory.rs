@@ -5,16 +5,16 @@
 //!                                                └─▶ nearest lane of each ─▶ lane changes
 //! ```
 //!
-//! A vehicle of a scenario keeps the centre of its lane, and changes lanes on a path of its own.
-//! The lane change that stands for a part of the trajectory passes 10 % and 90 % of the way between
-//! the two centres in the same time.
+//! A vehicle of a scenario keeps the centre of its lane, and changes lanes on a path of its own. A lane
+//! change replaces a part of the trajectory. It takes the same time from 10 % to 90 % of the way between
+//! the two centres.
 
 use super::dom::{ImportError, Node};
 use super::plane::{RoadPoint, nearest};
 use super::storyboard::{LaneChange, MOST_SPEED_MPS, STEP_S, Storyboard};
 
-/// Share of the duration of a lane change of a scenario between 10 % and 90 % of its way: of the
-/// quintic path 10 x³ − 15 x⁴ + 6 x⁵.
+/// Share of the duration of a lane change that passes between 10 % and 90 % of the way, on the quintic
+/// path 10 x³ − 15 x⁴ + 6 x⁵ of a scenario.
 const MIDDLE_SHARE: f64 = 0.506_72;
 /// Share of the way between two lanes at which a lane change is taken to have begun; its complement
 /// is the end. An assumption; 0.05 to 0.2 are plausible.
@@ -37,7 +37,7 @@ struct Point {
     on_road: RoadPoint,
 }
 
-/// What a vehicle on a trajectory does.
+/// The speeds and lane changes of a vehicle on a trajectory.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Driven {
     /// Times (s) and speeds (m/s), linear in between.
@@ -55,10 +55,10 @@ struct Change {
 }
 
 impl Storyboard<'_> {
-    /// Returns what a vehicle does that follows a trajectory from now.
+    /// Returns the speeds and lane changes of a vehicle that follows a trajectory from now on.
     ///
     /// # Errors
-    /// [`ImportError`] if the trajectory is no line through points with times, does not begin at
+    /// [`ImportError`] if the trajectory is not a line through points with times, does not begin at
     /// the vehicle, or leaves the lanes of the road.
     pub(super) fn trajectory(&self, node: &Node, vehicle: usize) -> Result<Driven, ImportError> {
         let reader = &self.reader;
@@ -134,7 +134,7 @@ impl Storyboard<'_> {
                 let (s_m, lane) = self.on_lane(position)?;
                 let index = self.road.lanes.iter().position(|candidate| *candidate == lane);
                 let Some(centre_m) = index.and_then(|index| self.road.centres_m.get(index)) else {
-                    let message = format!("lane {lane} is no driving lane along the road");
+                    let message = format!("lane {lane} is not a driving lane along the road");
                     return Err(reader.error(position, message));
                 };
                 Ok(RoadPoint { s_m, t_m: centre_m + reader.number_or(position, "offset", 0.0)? })
@@ -267,8 +267,8 @@ mod tests {
             .map(|step| f64::from(step) * 0.1)
             .map(|t| point(t, 30.0 * t, -1.75 - 3.5 * path(((t - 4.0) / 6.0).clamp(0.0, 1.0))))
             .collect();
-        let found = changes(&points, &[-1.75, -5.25]).unwrap();
-        let [change] = found[..] else { panic!("{found:?}") };
+        let detected = changes(&points, &[-1.75, -5.25]).unwrap();
+        let [change] = detected[..] else { panic!("{detected:?}") };
         assert_eq!((change.from, change.to), (0, 1));
         assert!((change.at_s - 4.0).abs() < 0.05 && (change.duration_s - 6.0).abs() < 0.05, "{change:?}");
         let broken_off: Vec<_> = points.iter().copied().take(75).collect();

@@ -112,7 +112,7 @@ fn check(
         let names = entries.keys().map(ParameterName::as_str).collect::<Vec<_>>().join(", ");
         return Err(ConfigError::new(
             partner.as_str(),
-            Problem::UnknownParameter { name: partner.clone(), known: names },
+            Problem::UnknownParameter { name: partner.clone(), allowed: names },
         ));
     }
     for parameter in [name, partner] {

@@ -7,5 +7,6 @@ use super::effects::Effects;
 #[derive(Default)]
 pub(super) struct LineMemory {
     pub(super) effects: Effects,
+    /// Memory for the x of the rays through each column.
     pub(super) x: Vec<[f32; MOMENTS + 1]>,
 }

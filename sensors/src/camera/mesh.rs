@@ -97,7 +97,7 @@ impl Surface {
         Self { emission, ..self }
     }
 
-    pub(crate) const RUBBER: Self = Self::plain([0.02, 0.02, 0.02], 0.1);
+    const RUBBER: Self = Self::plain([0.02, 0.02, 0.02], 0.1);
     pub(crate) const PLASTIC: Self = Self::plain([0.035, 0.035, 0.037], 0.3);
     pub(crate) const METAL: Self = Self::plain([0.35, 0.36, 0.37], 0.5);
     pub(crate) const GLASS: Self = Self::plain([0.02, 0.025, 0.03], 1.0).with_texture(Texture::Glass);

@@ -64,26 +64,12 @@ impl CropClassifier {
     /// crops that the network has classified.
     ///
     /// If `memory` knows a detection, its scores are the scores of its latest crop. Detections out
-    /// of view, and detections entirely beside the road, keep their scores. `scene` is the scene at
-    /// the time of the scan, `key` the key of the exposure's noise.
+    /// of view, and detections entirely beside the road, keep their scores. `key` is the key of the
+    /// exposure's noise.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] if the network fails. The scores of the detections before the
-    /// failure have then been updated already.
-    pub fn classify_detections(
-        &mut self,
-        scene: &Scene<'_>,
-        key: ExposureKey,
-        memory: &mut ImageMemory,
-        detections: &mut [Detection],
-    ) -> Result<usize, ClassifierError> {
-        self.classify_with(ImagedScene { now: scene, imaged: scene, fault: None }, key, memory, detections)
-    }
-
-    /// Classifies as [`CropClassifier::classify_detections`] does, with a fault of the camera.
-    ///
-    /// # Errors
-    /// As [`CropClassifier::classify_detections`].
+    /// Returns a [`ClassifierError`] if the network fails. The detections before the failure have
+    /// their new scores already.
     pub fn classify_with(
         &mut self,
         ImagedScene { now: scene, imaged, fault }: ImagedScene<'_>,
@@ -207,7 +193,8 @@ mod tests {
         let (road, environment, ego) = (Road::straight(3), Environment::CLEAR_DAY, vehicle(VehicleClass::Car, 500.0));
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others };
         let mut pipeline = CropClassifier::new(camera, &Backend::Tract).unwrap();
-        pipeline.classify_detections(&scene, ExposureKey(1), &mut ImageMemory::default(), detections).unwrap()
+        let seen = ImagedScene { now: &scene, imaged: &scene, fault: None };
+        pipeline.classify_with(seen, ExposureKey(1), &mut ImageMemory::default(), detections).unwrap()
     }
 
     #[test]

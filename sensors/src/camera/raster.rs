@@ -202,11 +202,11 @@ fn interpolated(corners: [[i32; 2]; 3], values: [f64; 3]) -> [f64; 3] {
     [a, b, values[0] - a * from[0] - b * from[1]]
 }
 
-/// Rounds to the nearest integer, halves away from zero, as `f32::round` does: that is a call of
+/// Rounds to the nearest integer, and halves away from zero. `f32::round` gives the same, but calls
 /// the C library.
 #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates")]
 fn rounded(x: f32) -> i32 {
-    // With a whole half, the sum of the number just below a half would round up to 1.
+    // If a whole half were added to the number just below a half, the sum would round up to 1.
     const BELOW_HALF: f32 = 0.5_f32.next_down();
     (x + BELOW_HALF.copysign(x)) as i32
 }
@@ -222,8 +222,10 @@ fn snap([x, y, z]: Vec3, Projection { focal_px, middle_px, optics }: Projection<
     [to_grid(middle_px[0], x), to_grid(middle_px[1], y)]
 }
 
-fn append(at: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
-    let mut corners = at.map(|corner| snap(corner, projection));
+/// Appends a triangle whose corners lie in front of the near plane (m), unless it faces away from the
+/// lens.
+fn append(corners_m: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
+    let mut corners = corners_m.map(|corner| snap(corner, projection));
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
     // Counter-clockwise corners have a negative area in image coordinates, because y points down.
@@ -233,7 +235,7 @@ fn append(at: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, o
     let inverse_depth = if projection.optics.is_straight() {
         plane.inverse_depth()
     } else {
-        interpolated(corners, at.map(|corner| 1.0 / f64::from(corner[2])))
+        interpolated(corners, corners_m.map(|corner| 1.0 / f64::from(corner[2])))
     };
     corners.swap(1, 2);
     let edges = [0, 1, 2].map(|index| edge(corners[index], corners[(index + 1) % 3]));
@@ -242,8 +244,8 @@ fn append(at: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, o
     out.push(ScreenTriangle { edges, bounds: [low(0), high(0), low(1), high(1)], inverse_depth, face });
 }
 
-/// The edge function from `a` to `b`, inside on the right of it; samples on the edge itself belong
-/// to the triangle below or to the right of it (the top-left rule).
+/// Returns the edge function from `a` to `b`, which is positive to the right of the edge. A sample on
+/// the edge belongs to the triangle below or to the right of it (the top-left rule).
 fn edge(a: [i32; 2], b: [i32; 2]) -> [i64; 3] {
     let [dx, dy] = [0, 1].map(|axis| i64::from(b[axis]) - i64::from(a[axis]));
     let is_top_left = dy < 0 || (dy == 0 && dx > 0);
@@ -326,6 +328,6 @@ mod tests {
         let mut out = Vec::new();
         project([[-1.0, 1.0, -2.0], [-1.0, 1.0, 10.0], [-1.0, -1.0, 10.0]], PINHOLE, 0, &mut out);
         project([[-1.0, 1.0, -2.0], [-1.0, -1.0, 10.0], [-1.0, 1.0, 10.0]], PINHOLE, 0, &mut out);
-        assert_eq!(out.len(), 2, "a quadrangle is left of the one that is seen from outside");
+        assert_eq!(out.len(), 2, "the triangle that is seen from outside becomes a quadrangle, which is two triangles");
     }
 }

@@ -1,8 +1,8 @@
 //! The public interface of the rear camera: it projects boxes to windows and renders scenes to
-//! images and crops.
+//! images.
 
 use super::exposure::ExposureKey;
-use super::image::{Crop, LabelledImage};
+use super::image::LabelledImage;
 use super::picture::PixelRect;
 use super::pinhole::{GroundBox, Lens, NEAR_M};
 use super::{Camera, Frame};
@@ -66,12 +66,6 @@ impl RearCamera {
     pub fn render_image(&self, scene: &Scene<'_>, key: ExposureKey) -> LabelledImage {
         Frame::new(&self.camera, scene, key, &[self.camera.resolution.image()]).image()
     }
-
-    /// Renders the crop of one window. For several windows of the same exposure, prepare one
-    /// [`Frame`] instead.
-    pub fn render_crop(&self, scene: &Scene<'_>, window: PixelRect, key: ExposureKey, crop: &mut Crop) {
-        Frame::new(&self.camera, scene, key, &[window]).crop(window, crop);
-    }
 }
 
 #[cfg(test)]
@@ -82,12 +76,19 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::CameraConfig;
-    use super::super::image::{CROP_PX, sample_positions};
+    use super::super::image::{CROP_PX, Crop, sample_positions};
     use super::super::picture::{Resolution, ResolutionConfig, WIDTH_PX};
     use super::*;
 
     fn rear_camera() -> RearCamera {
         RearCamera::new(CameraConfig::default().check(&Parameters::default()).unwrap())
+    }
+
+    /// Renders the crop of one window.
+    fn render_crop(camera: &RearCamera, scene: &Scene<'_>, window: PixelRect, key: ExposureKey) -> Crop {
+        let mut crop = Crop::default();
+        Frame::new(&camera.camera, scene, key, &[window]).crop(window, &mut crop);
+        crop
     }
 
     fn camera_with(change: impl FnOnce(&mut CameraConfig)) -> RearCamera {
@@ -179,9 +180,8 @@ mod tests {
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
         let scene = Scene { time: Time::from_ms(880), road: &road, environment: &environment, ego, others: &others };
         let image = camera.render_image(&scene, ExposureKey(42)).image;
-        let mut crop = Crop::default();
         for window in windows {
-            camera.render_crop(&scene, *window, ExposureKey(42), &mut crop);
+            let crop = render_crop(camera, &scene, *window, ExposureKey(42));
             let (columns, rows) =
                 (sample_positions(window.left, window.width), sample_positions(window.top, window.height));
             for (index, rgb) in crop.rgb.chunks_exact(3).enumerate() {
@@ -356,11 +356,7 @@ mod tests {
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
         let window = PixelRect { left: 600, top: 380, width: 64, height: 64 };
-        let rendered = |key| {
-            let mut crop = Crop::default();
-            rear_camera().render_crop(&scene, window, ExposureKey(key), &mut crop);
-            crop
-        };
+        let rendered = |key| render_crop(&rear_camera(), &scene, window, ExposureKey(key));
         assert_eq!(rendered(5), rendered(5));
         assert_ne!(rendered(5), rendered(6));
     }

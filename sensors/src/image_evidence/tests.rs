@@ -93,8 +93,8 @@ fn a_turned_camera_gives_the_same_widths_and_places() {
             let mask = Mask::new(box_px, [28, 28], vec![1.0; 28 * 28]).unwrap();
             let instance = Instance { box_px, class: VehicleClass::Car, score: 0.8, mask };
             let instances = std::slice::from_ref(&instance);
-            let found = with_scene(|scene| associate(&camera, scene, instances, std::slice::from_ref(&truth)));
-            let width_m = found.evidence[0].unwrap().width_m.unwrap();
+            let association = with_scene(|scene| associate(&camera, scene, instances, std::slice::from_ref(&truth)));
+            let width_m = association.evidence[0].unwrap().width_m.unwrap();
             assert!((width_m - truth.width_m).abs() < 0.1 * truth.width_m, "{yaw_deg}°, {distance_m} m: {width_m}");
             let alone = with_scene(|scene| associate(&camera, scene, instances, &[])).alone;
             let [seen] = &alone[..] else { panic!("{alone:?}") };

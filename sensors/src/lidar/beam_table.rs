@@ -1,10 +1,10 @@
-//! The pattern of a LiDAR that scans no raster, as a table of the directions and times of its
+//! The pattern of a LiDAR that does not scan a raster, as a table of the directions and times of its
 //! beams.
 //!
 //! ```text
 //!   azimuth_deg,elevation_deg,time_offset_us        azimuth: to the sensor's left as it looks, about its axis
 //!   -12.40,0.35,0.0                                 elevation: upward
-//!   3.15,-1.20,10.0                                 time: after the begin of the scan
+//!   3.15,-1.20,10.0                                 time: after the beginning of the scan
 //! ```
 //!
 //! Each beam becomes a column of one layer, in the order of the azimuths; beams of the same azimuth
@@ -36,28 +36,28 @@ const NEIGHBOURHOOD_DEG: f64 = 1.0;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BeamFileError {
     /// The first line does not name the columns.
-    #[error("the first line is `{found}`, but `{}` is needed", HEADER)]
+    #[error("the first line is `{actual}`, but `{}` is needed", HEADER)]
     Header {
         /// The line found.
-        found: String,
+        actual: String,
     },
     /// A line has another number of columns.
-    #[error("the line has {found} columns, but {} are needed", COLUMNS.len())]
+    #[error("the line has {actual} columns, but {} are needed", COLUMNS.len())]
     Columns {
         /// Number of the line, counted from 1.
         line: usize,
         /// The number of columns found.
-        found: usize,
+        actual: usize,
     },
-    /// A value is no number, or out of its range.
-    #[error("column `{column}` is `{found}`, but {allowed} is needed")]
+    /// A value is not a number, or out of its range.
+    #[error("column `{column}` is `{actual}`, but {allowed} is needed")]
     Number {
         /// Number of the line, counted from 1.
         line: usize,
         /// Name of the column.
         column: &'static str,
         /// The text found.
-        found: String,
+        actual: String,
         /// What is allowed.
         allowed: Range,
     },
@@ -99,7 +99,7 @@ pub(super) fn read(text: &str, limits: BeamLimits) -> Result<Vec<[f64; 3]>, Beam
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     let first = lines.next().map_or("", |(_, line)| line);
     if first != HEADER {
-        return Err(BeamFileError::Header { found: first.to_owned() });
+        return Err(BeamFileError::Header { actual: first.to_owned() });
     }
     let ranges = limits.ranges();
     lines.filter(|(_, row)| !row.is_empty()).map(|(line, row)| beam(line, row, &ranges)).collect()
@@ -109,7 +109,7 @@ pub(super) fn read(text: &str, limits: BeamLimits) -> Result<Vec<[f64; 3]>, Beam
 fn beam(line: usize, row: &str, ranges: &[Range; 3]) -> Result<[f64; 3], BeamFileError> {
     let cells: Vec<&str> = row.split(',').map(str::trim).collect();
     if cells.len() != COLUMNS.len() {
-        return Err(BeamFileError::Columns { line, found: cells.len() });
+        return Err(BeamFileError::Columns { line, actual: cells.len() });
     }
     let mut values = [0.0; 3];
     for (index, value) in values.iter_mut().enumerate() {
@@ -117,7 +117,7 @@ fn beam(line: usize, row: &str, ranges: &[Range; 3]) -> Result<[f64; 3], BeamFil
         *value = number.ok_or_else(|| BeamFileError::Number {
             line,
             column: COLUMNS[index],
-            found: cells[index].to_owned(),
+            actual: cells[index].to_owned(),
             allowed: ranges[index],
         })?;
     }
@@ -131,7 +131,7 @@ pub(super) struct BeamTable {
     pub(super) azimuths_deg: Vec<f64>,
     /// Elevation of each beam (deg).
     pub(super) elevations_deg: Vec<f64>,
-    /// Time of measurement of each beam after the begin of the scan (ns).
+    /// Time of measurement of each beam after the beginning of the scan (ns).
     pub(super) offsets_ns: Vec<u32>,
 }
 
@@ -172,7 +172,7 @@ impl BeamTable {
         [fold(f64::INFINITY, f64::min), fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// Returns the time of the last beam after the begin of the scan (ns).
+    /// Returns the time of the last beam after the beginning of the scan (ns).
     pub(super) fn duration_ns(&self) -> u32 {
         self.offsets_ns.iter().copied().max().unwrap_or(0)
     }
@@ -185,7 +185,7 @@ impl BeamTable {
         [low, self.azimuths_deg.len() - high]
     }
 
-    /// Returns the mean time of the beams near an azimuth after the begin of the scan (s). Where
+    /// Returns the mean time of the beams near an azimuth after the beginning of the scan (s). Where
     /// there are none, returns the mean time of all beams.
     pub(super) fn mean_offset_s(&self, azimuth_deg: f64) -> f64 {
         let end = |limit_deg: f64| self.azimuths_deg.partition_point(|beam_deg| *beam_deg < limit_deg);

@@ -2,7 +2,7 @@
 //! each.
 //!
 //! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its
-//! `model`, or a file of its own by `pattern-file`. A LiDAR that scans no raster has a table of
+//! `model`, or a file of its own by `pattern-file`. A LiDAR that does not scan a raster has a table of
 //! beams in place of layers and columns ([`super::beam_table`]).
 //!
 //! The range of a target of reflectivity ρ that fills the beam follows from one published range R
@@ -63,9 +63,9 @@ pub struct LidarKindConfig {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layers_deg: Vec<f64>,
     /// CSV file with the directions and times of all beams of a scan, in place of `layers-deg`, for
-    /// a LiDAR that scans no raster; relative to the file with this key. Its first line is
+    /// a LiDAR that does not scan a raster; relative to the file with this key. Its first line is
     /// `azimuth_deg,elevation_deg,time_offset_us`. The azimuth is about the sensor's axis, positive
-    /// to its left as it looks. The time counts from the begin of the scan. Its contents become
+    /// to its left as it looks. The time counts from the beginning of the scan. Its contents become
     /// `beams` when the scenario is read. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams_file: Option<String>,
@@ -174,7 +174,7 @@ pub struct LidarKind {
     pub(crate) mirror_cubic_deg: Option<[f64; 4]>,
     /// Azimuth of each column (°).
     pub(crate) azimuths_deg: Vec<f64>,
-    /// The beams of a LiDAR that scans no raster: each is a column of one layer.
+    /// The beams of a LiDAR that does not scan a raster: each is a column of one layer.
     pub(super) table: Option<BeamTable>,
     pub(crate) half_field_deg: f64,
     /// Finest azimuth step (°).

@@ -41,6 +41,7 @@ mod recorded;
 mod roadside;
 mod scan;
 mod scanner;
+#[cfg(test)]
 mod segmentation;
 mod shapes;
 mod silhouette;
@@ -76,6 +77,7 @@ pub use rear::RearLidar;
 pub use recorded::{PointError, PointFrame, PointTimes, RecordedPoints, ScanMotion};
 pub use scan::{LidarScan, MirrorSide, PointBeam, PointSource, PointTruth, ScanEchoes, ScanTruth};
 pub use scanner::Scanner;
-pub use segmentation::SegmentationReport;
+#[cfg(test)]
+pub(crate) use segmentation::SegmentationReport;
 #[cfg(test)]
 pub(crate) use shapes::append_solids;

@@ -52,7 +52,7 @@ pub(super) fn ends_at_plate(fit: &BoxFit) -> bool {
 }
 
 /// Returns true if two clusters may be the two headlamps of one vehicle.
-pub(super) fn are_lamps(a: &BoxFit, b: &BoxFit) -> bool {
+fn are_lamps(a: &BoxFit, b: &BoxFit) -> bool {
     let is_lamp = |fit: &BoxFit| fit.plate_m.is_none() && fit.width_m() <= LAMP_WIDTH_M + fit.spacing_m;
     let (right, left) = if a.across_m[0] < b.across_m[0] { (a, b) } else { (b, a) };
     // Columns at the edges of a lamp lie up to one spacing apart from them.

@@ -3,9 +3,7 @@
 
 use closecall_traffic::{Environment, Stream};
 
-use super::{
-    ClusteredPoints, Detector, LaneGeometry, Lidar, LidarScan, PointBeam, ScanTruth, Scanner, SegmentationReport,
-};
+use super::{ClusteredPoints, Detector, LaneGeometry, Lidar, LidarScan, PointBeam, ScanTruth, Scanner};
 use crate::faults::LidarFault;
 use crate::monitors::RoadBeam;
 use crate::{Detection, Scene, SensorError};
@@ -169,11 +167,5 @@ impl RearLidar {
     /// Returns true if the sensor has a mirror with two sides, which deflect the scans in turn.
     pub fn has_mirror_sides(&self) -> bool {
         self.scanner.has_mirror_sides()
-    }
-
-    /// Adds the latest scan to a report on the segmentation quality.
-    pub fn add_to_report(&self, report: &mut SegmentationReport) {
-        let clusters = (0..self.detector.latest().len()).map(|detection| self.detector.point_indices_of(detection));
-        report.observe(self.scanner.truth(), clusters);
     }
 }

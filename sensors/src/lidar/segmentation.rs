@@ -8,22 +8,22 @@ const MIN_POINTS: usize = 3;
 
 /// Segmentation errors, counted over several scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SegmentationReport {
+pub(crate) struct SegmentationReport {
     /// Vehicles with enough points to be detected, summed over the scans.
-    pub vehicles: usize,
+    pub(crate) vehicles: usize,
     /// Number of these vehicles whose points lie in more than one cluster.
-    pub over_segmented: usize,
+    pub(crate) over_segmented: usize,
     /// Number of these vehicles whose points lie in no cluster.
-    pub missed: usize,
+    pub(crate) missed: usize,
     /// Clusters that contain more than one vehicle.
-    pub under_segmented: usize,
+    pub(crate) under_segmented: usize,
     /// Clusters most of whose points do not originate from a vehicle.
-    pub background: usize,
+    pub(crate) background: usize,
 }
 
 impl SegmentationReport {
     /// Adds one scan. `clusters` yields the indices of each cluster's points in the scan.
-    pub fn observe<'a>(&mut self, truth: &ScanTruth, clusters: impl Iterator<Item = &'a [u32]>) {
+    pub(crate) fn observe<'a>(&mut self, truth: &ScanTruth, clusters: impl Iterator<Item = &'a [u32]>) {
         let mut in_scan: Vec<(usize, usize)> = Vec::new();
         count(truth.points.iter().map(|point| point.source), &mut in_scan);
         in_scan.retain(|&(_, points)| points >= MIN_POINTS);

@@ -121,12 +121,12 @@ const LEAST_DRIFT: f32 = 0.5;
 pub(crate) struct FaceDrift {
     /// Relative change of the range, m·v (1/s).
     per_s: f32,
-    /// Time after the begin of the scan at which the face is where the targets have it (s).
+    /// Time after the beginning of the scan at which the face is where the targets have it (s).
     at_s: f32,
 }
 
 impl FaceDrift {
-    /// Returns the factor of the range for a beam of this time after the begin of the scan (s).
+    /// Returns the factor of the range for a beam of this time after the beginning of the scan (s).
     fn factor(self, offset_s: f32) -> f32 {
         // Of a face that is seen edge-on, w is near zero, and the factor is anything.
         (1.0 + self.per_s * (offset_s - self.at_s)).clamp(LEAST_DRIFT, 2.0 - LEAST_DRIFT)
@@ -154,7 +154,7 @@ impl Targets {
     }
 
     /// Notes how the faces move that have been appended since the last call: with `velocity_mps` in
-    /// the sensor's frame (m/s). They are where the targets have them `at_s` after the begin of the
+    /// the sensor's frame (m/s). They are where the targets have them `at_s` after the beginning of the
     /// scan (s).
     #[expect(clippy::cast_possible_truncation, reason = "a factor of a range in single precision")]
     pub(crate) fn note_drift(&mut self, velocity_mps: Vector3<f64>, at_s: f64) {
@@ -165,7 +165,7 @@ impl Targets {
         }
     }
 
-    /// Returns the range at which a beam meets a face (m), `offset_ns` after the begin of the scan,
+    /// Returns the range at which a beam meets a face (m), `offset_ns` after the beginning of the scan,
     /// for the range at which it meets the face where the targets have it.
     #[inline(always)]
     pub(crate) fn drifted_m(&self, face: u32, range_m: f32, offset_ns: u32) -> f32 {

@@ -1,5 +1,5 @@
-//! What the tracker has made of each box of a scan. It is for tables and for tests: nothing here
-//! feeds back into perception.
+//! The use that the tracker makes of each box of a scan. Tables and tests read it. It does not feed
+//! back into perception.
 
 use closecall_traffic::TrackId;
 
@@ -8,22 +8,14 @@ use closecall_traffic::TrackId;
 pub struct Innovation {
     /// Mean over the modes of motion (m).
     pub innovation_m: f64,
-    /// Its predicted variance (m²): the mean over the modes, and the spread of the modes.
+    /// Predicted variance of the innovation (m²): the mean over the modes plus the spread of the modes.
     pub variance_m2: f64,
 }
 
-impl Innovation {
-    /// Returns the normalised innovation squared (NIS), whose mean is 1 for a consistent filter
-    /// (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.2).
-    pub fn nis(&self) -> f64 {
-        self.innovation_m * self.innovation_m / self.variance_m2
-    }
-}
-
-/// What the tracker has done with a box.
+/// The use of a box by the tracker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BoxRole {
-    /// It has rejected the box: it lies in the box of a track, or has no usable position.
+    /// The tracker rejects the box: the box lies in the box of a track, or has no usable position.
     #[default]
     Ignored,
     /// The box is a part of the vehicle of a track, such as a wheel.
@@ -46,16 +38,16 @@ impl BoxRole {
     }
 }
 
-/// What the tracker has made of one box.
+/// One box, with its use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxUse {
     /// Number of the sensor in the chain.
     pub(crate) sensor: usize,
     /// Index of the box in its scan.
     pub index: usize,
-    /// What the tracker has done with it.
+    /// The use of the box.
     pub role: BoxRole,
-    /// The track that it belongs to; `None` if it is ignored.
+    /// The track that the box belongs to; `None` if the box is ignored.
     pub track: Option<TrackId>,
     /// The innovations along and across the road before the correction, if the box corrects a
     /// track.

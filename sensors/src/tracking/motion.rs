@@ -27,8 +27,8 @@
 //! no reason to. The rates rise with 1/TTC (time to collision).
 //!
 //! The values without a source above (the rates, their rise with 1/TTC, and the drivers'
-//! anticipation time) were tuned on the library's scenarios with separate seeds. The example
-//! `validate_perception` judges them on other seeds.
+//! anticipation time) were tuned on the library's scenarios with separate seeds.
+//! `just xtask validate-perception` judges them on other seeds.
 
 /// Maximum number of modes of an axis.
 pub const MODES: usize = 3;

@@ -46,7 +46,7 @@ const MANOEUVRE_MPS2: f64 = 2.5;
 /// trucks: it matters only while a vehicle moves across the road.
 const HALF_LENGTH_SD_M: f64 = 0.4;
 /// Speed below which the direction of motion does not determine the heading (m/s).
-pub const HEADING_SPEED_MPS: f64 = 3.0;
+const HEADING_SPEED_MPS: f64 = 3.0;
 
 /// The measured position of a vehicle's face.
 #[derive(Clone, Copy, Debug)]

@@ -238,7 +238,10 @@ pub enum UnknownController {
         source: TunedError,
     },
     /// There is no controller of this name in the program that has Closecall as a library.
-    #[error("`{text}` is a controller of a Python program, and can be run from there only: {}", hosted::known())]
+    #[error(
+        "`{text}` is a controller of a Python program, and can be run from there only: {}",
+        hosted::registered_names()
+    )]
     Hosted {
         /// The text.
         text: String,

@@ -49,7 +49,9 @@ pub(super) fn in_worker(process: HostedProcess) -> Result<Arc<dyn ControllerFact
     match (refused, registry().get(&process.id).cloned()) {
         (Some(reason), _) => Err(reason),
         (None, Some(factory)) => Ok(Arc::new(Named { name: process.name, factory })),
-        (None, None) => Err(format!("the process of the controller does not have `{}`: {}", process.id, known())),
+        (None, None) => {
+            Err(format!("the process of the controller does not have `{}`: {}", process.id, registered_names()))
+        }
     }
 }
 
@@ -75,7 +77,7 @@ pub fn register(name: &str, factory: Arc<dyn ControllerFactory>) -> Registration
 }
 
 /// Returns the names that are registered, for a message.
-pub(super) fn known() -> String {
+pub(super) fn registered_names() -> String {
     let names: Vec<String> = registry().keys().map(|name| format!("`{name}`")).collect();
     if names.is_empty() { "this program has none".to_owned() } else { format!("there is {}", names.join(", ")) }
 }
@@ -183,8 +185,11 @@ impl ControllerFactory for Missing {
 
 impl EgoController for Missing {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
-        let reason =
-            format!("`{}` is a controller of a Python program, and can be run from there only: {}", self.name, known());
+        let reason = format!(
+            "`{}` is a controller of a Python program, and can be run from there only: {}",
+            self.name,
+            registered_names()
+        );
         Err(ControllerError::Own { reason, time: input.time })
     }
 }

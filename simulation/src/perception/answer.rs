@@ -61,8 +61,8 @@ pub(super) enum AnswerError {
     #[error("the process answered {line:?}, which is not JSON: {reason}")]
     NotJson { line: String, reason: String },
     /// A field is not what it must be.
-    #[error("the process answered {line:?}: `{field}` must be {needed}, it is {found}")]
-    Field { line: String, field: String, needed: String, found: String },
+    #[error("the process answered {line:?}: `{field}` must be {needed}, it is {actual}")]
+    Field { line: String, field: String, needed: String, actual: String },
 }
 
 impl AnswerError {
@@ -70,8 +70,8 @@ impl AnswerError {
     pub(super) fn without_line(&self, who: &str) -> String {
         match self {
             // A number that is not finite is written as a word.
-            Self::Field { field, needed, found, .. } => {
-                format!("{who} answered: `{field}` must be {needed}, it is {}", found.trim_matches('"'))
+            Self::Field { field, needed, actual, .. } => {
+                format!("{who} answered: `{field}` must be {needed}, it is {}", actual.trim_matches('"'))
             }
             Self::NotObject { .. } | Self::NotJson { .. } => self.to_string(),
         }
@@ -82,18 +82,18 @@ impl AnswerError {
 struct Wrong {
     field: String,
     needed: String,
-    found: String,
+    actual: String,
 }
 
 impl Wrong {
-    fn new(field: String, needed: impl Into<String>, found: Option<&Value>) -> Self {
-        let found = found.map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
-        Self { field, needed: needed.into(), found }
+    fn new(field: String, needed: impl Into<String>, actual: Option<&Value>) -> Self {
+        let actual = actual.map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
+        Self { field, needed: needed.into(), actual }
     }
 
     fn in_line(self, line: &[u8]) -> AnswerError {
-        let Self { field, needed, found } = self;
-        AnswerError::Field { line: excerpt(line), field, needed, found }
+        let Self { field, needed, actual } = self;
+        AnswerError::Field { line: excerpt(line), field, needed, actual }
     }
 }
 
@@ -128,9 +128,12 @@ pub(super) fn parse(
     };
     match object.get("time_ns").and_then(Value::as_i64) {
         Some(time_ns) if time_ns == time.ns() => Ok(parsed(&object, kind, time).map_err(|wrong| wrong.in_line(line))),
-        Some(time_ns) => {
-            Err(ExecError::OtherStep { line: excerpt(line), expected: time.ns(), found: time_ns.to_string(), answered })
-        }
+        Some(time_ns) => Err(ExecError::OtherStep {
+            line: excerpt(line),
+            expected: time.ns(),
+            actual: time_ns.to_string(),
+            answered,
+        }),
         None => {
             let needed = format!("{}, the `time_ns` of the question", time.ns());
             Ok(Err(Wrong::new("time_ns".to_owned(), needed, object.get("time_ns")).in_line(line)))
@@ -362,8 +365,8 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, AnswerError> {
         Ok(_) => Err(AnswerError::NotObject { line: excerpt(line) }),
         // JSON has neither NaN nor infinity, but the JSON writers of many languages write them.
         Err(error) => Err(match not_finite(line) {
-            Some((field, found)) => {
-                AnswerError::Field { line: excerpt(line), field, needed: "a finite number".to_owned(), found }
+            Some((field, actual)) => {
+                AnswerError::Field { line: excerpt(line), field, needed: "a finite number".to_owned(), actual }
             }
             None => not_json(error.to_string()),
         }),
@@ -457,13 +460,15 @@ mod tests {
     #[test]
     fn the_covariance_of_a_detection_is_turned_to_the_line_of_sight() {
         let element = DETECTION.replace("[[0.04,0],[0,0.04]]", "[[0.04,0.03],[0.03,0.09]]");
-        let Ok(PerceptionAnswer::Detections(found)) = answer(Kind::Detections, &element) else { panic!("detections") };
+        let Ok(PerceptionAnswer::Detections(detections)) = answer(Kind::Detections, &element) else {
+            panic!("detections")
+        };
         // The line of sight has the direction (−0.6, 0.8).
         let range_m2 = 0.36 * 0.04 - 2.0 * 0.48 * 0.03 + 0.64 * 0.09;
         let lateral_m2 = 0.64 * 0.04 + 2.0 * 0.48 * 0.03 + 0.36 * 0.09;
-        assert!((found[0].range_sd_m.powi(2) - range_m2).abs() < 1e-12);
-        assert!((found[0].lateral_sd_m.powi(2) - lateral_m2).abs() < 1e-12);
-        assert_eq!((found[0].length, found[0].class), (Extent::Assumed, ClassScores::UNKNOWN));
+        assert!((detections[0].range_sd_m.powi(2) - range_m2).abs() < 1e-12);
+        assert!((detections[0].lateral_sd_m.powi(2) - lateral_m2).abs() < 1e-12);
+        assert_eq!((detections[0].length, detections[0].class), (Extent::Assumed, ClassScores::UNKNOWN));
     }
 
     #[test]

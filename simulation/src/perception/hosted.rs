@@ -34,9 +34,9 @@ pub fn words(name: &str) -> Option<Vec<String>> {
 /// Returns why a perception cannot be run.
 pub(super) fn missing() -> String {
     let names: Vec<String> = registry().keys().map(|name| format!("`{name}`")).collect();
-    let known =
+    let registered =
         if names.is_empty() { "this program has none".to_owned() } else { format!("there is {}", names.join(", ")) };
-    format!("it is an object of a Python program, and can be run from there only: {known}")
+    format!("it is an object of a Python program, and can be run from there only: {registered}")
 }
 
 #[cfg(test)]

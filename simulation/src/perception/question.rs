@@ -12,7 +12,7 @@ use closecall_traffic::{CONTROL_STEP, Dimensions, Road};
 use super::message::{Camera, Ego, Hello, Image, Lidar, Message, Odometry, RadarDetection, RadarScan, Scan, Scans};
 use crate::controller::exec::{PROTOCOL, to_line};
 
-/// What a process is told once.
+/// The content of the first message to a process.
 pub(super) struct Setup<'a> {
     pub(super) size: Dimensions,
     pub(super) road: &'a Road,
@@ -23,7 +23,7 @@ pub(super) struct Setup<'a> {
 }
 
 impl<'a> Setup<'a> {
-    /// Returns what is told before a question.
+    /// Takes the content of the first message from a question.
     pub(super) fn of(question: &PerceptionQuestion<'a>) -> Self {
         let PerceptionQuestion { size, road, lidars, radars, camera, latency_s, .. } = *question;
         Self { size, road, lidars, radars, camera, latency_s }

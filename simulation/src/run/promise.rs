@@ -111,7 +111,7 @@ impl PromiseMeter {
     }
 }
 
-/// Returns whether braking within the limit gains the headway until the vehicle behind arrives.
+/// Returns true if braking within the limit reaches the goal before the vehicle behind arrives.
 fn is_in_reach(encounter: Encounter, settings: &MisSettings) -> bool {
     let response = BrakingResponse {
         commanded_mps2: 0.0,
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_headway_counts_from_the_smallest_one_until_the_vehicle_behind_is_near() {
+    fn the_gain_counts_from_the_smallest_headway_before_the_vehicle_behind_is_near() {
         let mut meter = PromiseMeter::new();
         for (time_ms, thw_s) in [(0, 0.8), (10, 0.7), (20, 0.9)] {
             meter.observe(&at(time_ms, 0.0, thw_s));

@@ -1,4 +1,4 @@
-//! The overtaking driver behind one slow vehicle: it signals, gives up, and returns.
+//! The overtaking driver behind one slow vehicle: the driver signals, gives up, and returns.
 
 use closecall_controllers::DriverNote;
 use closecall_traffic::{Indicator, Lane};
@@ -53,7 +53,7 @@ follow = {{ wiedemann99 = {{ cc1-s = {cc1_s:?} }} }}
 }
 
 #[test]
-fn it_signals_before_it_pulls_out() {
+fn the_overtaker_signals_before_it_pulls_out() {
     let drive = Overtaker::TYPICAL.drive("", 60.0);
     let signals_s = drive.first_s(REAR, 0.0, |rear| rear.indicator == Indicator::Left).unwrap();
     let before_s = drive.noted_s(REAR, DriverNote::CutOutStarted).unwrap() - signals_s;
@@ -61,7 +61,7 @@ fn it_signals_before_it_pulls_out() {
 }
 
 #[test]
-fn it_crosses_the_marking_at_the_requested_headway() {
+fn the_overtaker_crosses_the_marking_at_the_requested_headway() {
     for cut_out_thw_s in [0.15, 0.2, 0.3, 0.4] {
         let drive = Overtaker { cut_out_thw_s, cc1_s: 0.02, more: "" }.drive("", 60.0);
         let crossing_s = drive.first_s(REAR, 0.0, |rear| drive.road.lane_at(rear.d_m) == Lane(1)).unwrap();
@@ -73,7 +73,7 @@ fn it_crosses_the_marking_at_the_requested_headway() {
 }
 
 #[test]
-fn it_returns_once_it_has_passed_if_the_scenario_says_so() {
+fn the_overtaker_returns_after_passing_if_the_scenario_says_so() {
     let returns = Overtaker { more: "returns = { after-s = 1.0, thw-s = 0.8 }", ..Overtaker::TYPICAL };
     let drive = returns.drive("", 60.0);
     let passed_s = drive.noted_s(REAR, DriverNote::Passed).unwrap();
@@ -82,22 +82,23 @@ fn it_returns_once_it_has_passed_if_the_scenario_says_so() {
     assert!(signals_s - passed_s >= 1.0);
     let centre_m = drive.road.lane_centre_m(Lane(2));
     let returned_s = drive.first_s(REAR, signals_s, |rear| rear.d_m <= centre_m + 1e-9).unwrap();
-    // The headway suffices when the vehicle begins to return. It grows afterwards, because the vehicle is the faster one.
+    // The headway is long enough when the vehicle begins to return. It then grows, because the vehicle is faster.
     assert!(gap_m(drive.at(REAR, returned_s), drive.at(SLOW, returned_s)) > 0.8 * 28.0);
 }
 
 #[test]
-fn it_stays_in_the_passing_lane_if_the_scenario_does_not_say_so() {
+fn the_overtaker_stays_in_the_passing_lane_if_the_scenario_has_no_key_returns() {
     let drive = Overtaker::TYPICAL.drive("", 60.0);
     assert_eq!(drive.lane(REAR, 59.9), Lane(1));
 }
 
 #[test]
-fn it_gives_up_and_brakes_if_the_gap_closes() {
+fn the_overtaker_gives_up_and_brakes_if_the_gap_closes() {
     let cut_out_s = Overtaker::TYPICAL.drive("", 60.0).noted_s(REAR, DriverNote::CutOutStarted).unwrap();
-    // A motorcycle in the passing lane, 20 m behind at the same speed, accelerates as soon as the other pulls out. A car of
-    // the simulation accelerates at 4 m/s² at most. From 30 m behind, the driver gives up 0.25 m before the marking, at a
-    // lateral speed of 1.4 m/s. The plant keeps that speed at first, so that the centre gets 0.4 m past the marking.
+    // A motorcycle in the passing lane, 20 m behind at the same speed, accelerates as soon as the overtaker pulls out. A
+    // car of the simulation would accelerate at 4 m/s² at most. If the motorcycle started 30 m behind, the driver would give
+    // up 0.25 m before the marking, at a lateral speed of 1.4 m/s. The plant keeps that speed at first, and the centre would
+    // get 0.4 m past the marking.
     let (from_s, to_s) = (cut_out_s + 0.1, cut_out_s + 2.1);
     let shoots = format!(
         r#"
@@ -124,7 +125,7 @@ driver = {{ prescribed = {{ acceleration-profile = [[{from_s:?}, 5.0], [{to_s:?}
 }
 
 #[test]
-fn it_follows_the_vehicle_that_it_overtakes_if_that_one_changes_lanes_in_front() {
+fn the_overtaker_follows_a_slow_vehicle_that_changes_lanes_in_front_of_it() {
     // The slower vehicle comes into the driver's way after the driver has begun to pull out, 1.2 s behind it.
     let pulls_out = |at_s: f64| {
         format!(
@@ -180,7 +181,7 @@ driver = {{ wiedemann99 = {{ cc1-s = 0.9, reaction-s = 0.7{lapse} }} }}
 }
 
 #[test]
-fn a_driver_that_looks_away_reacts_to_a_brake_light_later() {
+fn a_driver_who_looks_away_reacts_to_a_brake_light_later() {
     let attentive_s = answers_at_s("");
     assert!((3.7..3.9).contains(&attentive_s), "{attentive_s}");
     let lapse_s = answers_at_s(", lapse = { at-s = 2.5, duration-s = 1.2 }");

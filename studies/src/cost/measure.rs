@@ -13,10 +13,10 @@ use crate::case::{CausesError, fails};
 pub const TIMED_SAMPLES: usize = 50;
 /// Thresholds of the rear time headway (s): 1 s, and the headway below which the paper calls a
 /// following critical.
-pub(super) const THW_BELOW_S: [f64; 2] = [1.0, 0.5];
+const THW_BELOW_S: [f64; 2] = [1.0, 0.5];
 /// Threshold of the rear time to collision (s): the time to closest encounter below which the paper
 /// calls an encounter critical.
-pub(super) const TTC_BELOW_S: f64 = 2.6;
+const TTC_BELOW_S: f64 = 2.6;
 const SECONDS_PER_HOUR: f64 = 3_600.0;
 /// Number of samples that are kept. The samples to be timed are taken from them.
 const MAX_KEPT: usize = 4_096;

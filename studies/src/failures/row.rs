@@ -69,7 +69,7 @@ impl FailureRow {
     }
 
     /// Returns whether no stage and no pair of stages explains the failure.
-    pub fn is_unexplained(&self) -> bool {
+    fn is_unexplained(&self) -> bool {
         self.cause == Some(Cause::None)
     }
 

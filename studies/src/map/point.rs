@@ -8,7 +8,7 @@ use serde::Serialize;
 pub const PAPER_IN_TIME: [(f64, &str); 3] = [(20.0, "always"), (25.0, "59 %"), (30.0, "not stated")];
 
 /// Largest difference of margin between theory and loop that needs no reason (s).
-pub(super) const AGREES_WITHIN_S: f64 = 0.2;
+const AGREES_WITHIN_S: f64 = 0.2;
 
 /// One point of the map.
 #[derive(Clone, Debug, PartialEq, Serialize)]

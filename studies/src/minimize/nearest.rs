@@ -79,8 +79,8 @@ struct Start {
     point: NormalPoint,
 }
 
-/// A failing case near the nominal one.
-struct Found<'a> {
+/// A failing case near the nominal case.
+struct NearFailure<'a> {
     trial: Trial<'a>,
     point: NormalPoint,
     has_converged: bool,
@@ -140,11 +140,11 @@ impl NearestSearch {
     /// [`CausesError`] if no sample fails when it is run again, or the case cannot be described.
     pub fn run(&self, saved: &SavedCampaign, most_runs: u64) -> Result<Minimized, CausesError> {
         let starts = self.starts();
-        let mut found: Vec<Found<'_>> = Vec::new();
+        let mut failures: Vec<NearFailure<'_>> = Vec::new();
         let (mut tried, mut runs) = (0, 0);
         let mut without_outcome: Option<WithoutOutcome> = None;
         for Start { case, point } in &starts {
-            if !found.is_empty() && runs >= most_runs / 2 {
+            if !failures.is_empty() && runs >= most_runs / 2 {
                 break;
             }
             let trial = Trial::new(case);
@@ -152,23 +152,23 @@ impl NearestSearch {
             tried += 1;
             runs += trial.runs();
             match first {
-                Some((point, has_converged)) => found.push(Found { trial, point, has_converged }),
+                Some((point, has_converged)) => failures.push(NearFailure { trial, point, has_converged }),
                 None => without_outcome = WithoutOutcome::joined(without_outcome, trial.without_outcome()),
             }
-            if found.last().is_some_and(|found| found.length_sd() == 0.0) {
+            if failures.last().is_some_and(|failure| failure.length_sd() == 0.0) {
                 break;
             }
         }
-        found.sort_by(|a, b| a.length_sd().total_cmp(&b.length_sd()));
-        if found.first().is_none_or(|found| found.length_sd() > 0.0) {
-            for (index, one) in found.iter_mut().take(CONTINUED as usize).enumerate() {
+        failures.sort_by(|a, b| a.length_sd().total_cmp(&b.length_sd()));
+        if failures.first().is_none_or(|failure| failure.length_sd() > 0.0) {
+            for (index, failure) in failures.iter_mut().take(CONTINUED as usize).enumerate() {
                 let share = most_runs.saturating_sub(runs) / (CONTINUED - index as u64);
-                let before = one.trial.runs();
-                one.search(before + share);
-                runs += one.trial.runs() - before;
+                let before = failure.trial.runs();
+                failure.search(before + share);
+                runs += failure.trial.runs() - before;
             }
         }
-        let Some(nearest) = found.iter().min_by(|a, b| a.length_sd().total_cmp(&b.length_sd())) else {
+        let Some(nearest) = failures.iter().min_by(|a, b| a.length_sd().total_cmp(&b.length_sd())) else {
             return Err(match without_outcome {
                 Some(WithoutOutcome { message, .. }) => {
                     let controller = self.case.arm.controller.name().to_owned();
@@ -189,8 +189,8 @@ impl NearestSearch {
         let names: Vec<ParameterName> = values.iter().map(|(name, _)| name).filter(is_off).cloned().collect();
         let described = described(trial, &values, &names, &[])?;
         let distance_sd = Some(nearest.length_sd());
-        let of_found = found.iter().map(|one| one.trial.without_outcome());
-        let without_outcome = of_found.fold(without_outcome, WithoutOutcome::joined);
+        let further = failures.iter().map(|failure| failure.trial.without_outcome());
+        let without_outcome = further.fold(without_outcome, WithoutOutcome::joined);
         Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, without_outcome, ..described }))
     }
 
@@ -243,7 +243,7 @@ fn drawn_in(trial: &Trial<'_>, mut point: NormalPoint) -> Option<(NormalPoint, b
     Some((NormalPoint { normals: design_point.into_point(), labels }, false))
 }
 
-impl Found<'_> {
+impl NearFailure<'_> {
     fn length_sd(&self) -> f64 {
         self.trial.case.file.space().length_sd(&self.point)
     }

@@ -29,7 +29,7 @@ const WAIT_STEPS: i64 = 100;
 const APPEARS_AFTER_STEPS: i64 = 150;
 /// Distance beyond which a track and a vehicle do not belong together (m): the cut-off of GOSPA, a
 /// usual value for vehicles.
-pub const CUTOFF_M: f64 = 5.0;
+const CUTOFF_M: f64 = 5.0;
 
 /// The observation of one control step.
 #[derive(Clone, Copy, Debug)]

@@ -19,7 +19,7 @@ use crate::perception::study::StudyError;
 /// Gaps between which errors are measured, and the gap that divides near from far (m).
 pub(crate) const GAPS_M: [f64; 3] = [20.0, 50.0, 80.0];
 /// Lag at which the correlation of errors is taken (control steps): 1 s.
-pub(crate) const LAG_STEPS: usize = 25;
+const LAG_STEPS: usize = 25;
 /// Bounds of a correlation (-), which leave its time finite.
 const CORRELATION_BOUNDS: [f64; 2] = [1e-3, 0.999];
 

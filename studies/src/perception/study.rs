@@ -1,4 +1,4 @@
-//! All approaches of all cases.
+//! Runs all approaches of all cases.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -12,7 +12,7 @@ use crate::perception::approach::{Address, Approach, approach};
 use crate::perception::cases::{Case, cases};
 use crate::perception::figures::Figures;
 
-/// How many approaches of each case are run.
+/// The number of approaches of each case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Few: within a minute on two cores.
@@ -98,18 +98,19 @@ impl Study {
     /// # Errors
     /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
     pub fn of(file: &ScenarioFile, mode: Option<SensorMode>, seed: u64, extent: Extent) -> Result<Self, StudyError> {
-        Self::watched(file, mode, (seed, extent), &|_| ())
+        Self::watched(file, mode, seed, extent, &|_| ())
     }
 
-    /// Works like [`Self::of`]. `on_progress` receives the number of approaches that are done, and of
-    /// all.
+    /// Works like [`Self::of`]. `on_progress` receives the number of finished approaches and the number of
+    /// all approaches.
     ///
     /// # Errors
-    /// As of [`Self::of`].
+    /// The errors of [`Self::of`].
     pub fn watched(
         file: &ScenarioFile,
         mode: Option<SensorMode>,
-        (seed, extent): (u64, Extent),
+        seed: u64,
+        extent: Extent,
         on_progress: &(dyn Fn([u64; 2]) + Sync),
     ) -> Result<Self, StudyError> {
         let scenario = file.concrete(&file.space().nominal())?;
@@ -118,18 +119,28 @@ impl Study {
             return Err(StudyError::GroundTruth);
         }
         let cases = cases(sensors.mode(), &scenario.environment, &scenario.road)?;
-        let cases = study(&cases, &sensors, &scenario.road, ([seed, extent.runs()], on_progress))?;
+        let batch = Batch { seed, runs: extent.runs() };
+        let cases = study(&cases, &sensors, &scenario.road, batch, on_progress)?;
         let name = file.config().name.clone();
         Ok(Self { name, mode: sensors.mode(), seed, runs: extent.runs(), cases })
     }
 }
 
-/// Runs all approaches of the cases, in parallel and in the order of their numbers.
-pub(crate) fn study(
+/// The approaches of each case.
+#[derive(Clone, Copy)]
+struct Batch {
+    seed: u64,
+    /// Number of approaches.
+    runs: u64,
+}
+
+/// Runs all approaches of the cases in parallel. The results are in the order of their numbers.
+fn study(
     cases: &[Case],
     sensors: &Sensors,
     road: &Road,
-    ([seed, runs], on_progress): ([u64; 2], &(dyn Fn([u64; 2]) + Sync)),
+    Batch { seed, runs }: Batch,
+    on_progress: &(dyn Fn([u64; 2]) + Sync),
 ) -> Result<Vec<(Case, Figures)>, StudyError> {
     let jobs: Vec<(usize, u64)> = (0..cases.len()).flat_map(|case| (0..runs).map(move |run| (case, run))).collect();
     let (all, done) = (jobs.len() as u64, AtomicU64::new(0));

@@ -40,7 +40,7 @@ pub fn data() -> Option<PathBuf> {
 /// # Panics
 /// As [`skip`].
 pub fn has_display() -> bool {
-    found(runs("xvfb-run", "--help"), Need::Display, "xvfb-run is not installed").is_some()
+    or_skip(runs("xvfb-run", "--help"), Need::Display, "xvfb-run is not installed").is_some()
 }
 
 /// Returns true if `python3` can be run.
@@ -48,7 +48,7 @@ pub fn has_display() -> bool {
 /// # Panics
 /// As [`skip`].
 pub fn has_python() -> bool {
-    found(runs("python3", "--version"), Need::Python, "python3 is not installed").is_some()
+    or_skip(runs("python3", "--version"), Need::Python, "python3 is not installed").is_some()
 }
 
 /// Returns a Python interpreter with the packages `onnxruntime` and `numpy`, from the environment
@@ -58,7 +58,7 @@ pub fn has_python() -> bool {
 /// As [`skip`].
 pub fn python_with_onnxruntime() -> Option<PathBuf> {
     let reason = "CLOSECALL_ONNXRUNTIME does not lie in a Python environment with onnxruntime and numpy";
-    found(python_around(&onnxruntime()?, "numpy, onnxruntime"), Need::Python, reason)
+    or_skip(python_around(&onnxruntime()?, "numpy, onnxruntime"), Need::Python, reason)
 }
 
 /// Returns a Python interpreter with the packages `rerun`, `datafusion`, `pandas` and `matplotlib`,
@@ -68,7 +68,7 @@ pub fn python_with_onnxruntime() -> Option<PathBuf> {
 /// As [`skip`].
 pub fn python_with_rerun() -> Option<PathBuf> {
     let reason = "CLOSECALL_RERUN does not lie in a Python environment with datafusion, pandas and matplotlib";
-    found(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
+    or_skip(python_around(&viewer()?, "rerun, datafusion, pandas, matplotlib"), Need::Python, reason)
 }
 
 /// Returns a Python interpreter that has these packages, separated by commas: the interpreter of the environment in which the Rerun viewer lies.
@@ -77,7 +77,7 @@ pub fn python_with_rerun() -> Option<PathBuf> {
 /// As [`skip`].
 pub fn python_with(packages: &str) -> Option<PathBuf> {
     let reason = format!("CLOSECALL_RERUN does not lie in a Python environment with {packages}");
-    found(python_around(&viewer()?, packages), Need::Python, &reason)
+    or_skip(python_around(&viewer()?, packages), Need::Python, &reason)
 }
 
 /// Returns the interpreter of the Python environment in which a file lies, if it has these packages.
@@ -95,7 +95,7 @@ fn python_around(file: &Path, packages: &str) -> Option<PathBuf> {
 /// As [`skip`].
 pub fn browser() -> Option<&'static str> {
     let browser = BROWSERS.into_iter().find(|name| runs(name, "--version").is_some());
-    found(browser, Need::Browser, "neither Chromium nor Google Chrome is installed")
+    or_skip(browser, Need::Browser, "neither Chromium nor Google Chrome is installed")
 }
 
 /// Returns a Python interpreter with the checkers and readers of exchange formats.
@@ -110,11 +110,11 @@ pub fn python_with_exchange() -> Option<PathBuf> {
 /// Returns the path that an environment variable names. An empty variable counts as none.
 fn named_by(variable: &str, need: Need, reason: &str) -> Option<PathBuf> {
     let path = std::env::var_os(variable).filter(|path| !path.is_empty()).map(PathBuf::from);
-    found(path, need, reason)
+    or_skip(path, need, reason)
 }
 
 /// Returns `something`, and says that the test is skipped if there is none.
-fn found<T>(something: Option<T>, need: Need, reason: &str) -> Option<T> {
+fn or_skip<T>(something: Option<T>, need: Need, reason: &str) -> Option<T> {
     // A misspelt variable fails a test also on a machine that has everything.
     required();
     if something.is_none() {

@@ -36,7 +36,7 @@ use schedule::{Setup, Violation};
 const SCHEDULES: u64 = 10_000;
 
 fn number_from_env(name: &str) -> Option<u64> {
-    std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is no number: `{text}`")))
+    std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number: `{text}`")))
 }
 
 /// Runs schedules, and returns the first violation by seed, with the number of schedules that met a

@@ -33,7 +33,7 @@ pub(super) struct State {
     pub(super) rate: f64,
     /// Number of faults so far.
     pub(super) faults: u64,
-    /// Crashes during the run of a sample in an arm, which is asked for now.
+    /// Number of crashes so far in the run that the present question asks for: one sample in one arm.
     pub(super) crashes: u32,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Process {
     pub(super) truth: Arc<Truth>,
     pub(super) arm: usize,
     pub(super) task: String,
-    /// What arrives, by the time of its arrival (ns) and the order in which it was written.
+    /// The arrivals, by time (ns) and by the order in which they were written.
     pipe: BTreeMap<(u128, usize), Arrival>,
     /// Number of messages that were written.
     written: usize,
@@ -76,7 +76,7 @@ pub(super) struct Process {
     earlier: VecDeque<Question>,
 }
 
-/// A fault of a process, instead of answering once.
+/// What a process does instead of one right answer.
 #[derive(Clone, Copy)]
 enum Fault {
     /// The process answers twice.
@@ -91,9 +91,9 @@ enum Fault {
     AnotherArm,
     /// The process answers for another campaign.
     AnotherTask,
-    /// Its copy answers, and says so.
+    /// A copy of the process answers, and says that it is a copy.
     Copy,
-    /// Both it and its copy answer, in either order.
+    /// Both the process and its copy answer, in either order.
     ProcessAndCopy,
     /// The process ends in the middle of its answer.
     Cut,
@@ -107,7 +107,8 @@ enum Fault {
     Late,
     /// The process reports that a call hangs, and ends.
     HangingCall,
-    /// The same in a validity check: the sample has its outcome already.
+    /// The process reports that a call hangs in a validity check, and ends. The sample already has its
+    /// outcome.
     HangingCheck,
 }
 
@@ -150,7 +151,7 @@ impl Process {
         Answer { question: question.clone(), copied_from: None, record, wall_s: 0.01, check_s: 0.0, is_last: false }
     }
 
-    /// Runs a sample: writes the lines of the process, and their times.
+    /// Runs a sample: writes the lines of the process into the pipe, each with its time of arrival.
     fn serve(&mut self, state: &mut State, question: &Question, limit: Duration) {
         let right = self.answer(question, self.arm, question.sample);
         let at = state.now + ANSWER_TIME;
@@ -158,7 +159,7 @@ impl Process {
         if !state.has_fault() {
             return self.write(at, line(&right));
         }
-        // Before the next question, or during it.
+        // A time before the next question, or during it.
         let soon = at + ANSWER_TIME.mul_f64(2.0 * state.random.random::<f64>());
         let before = state.now + ANSWER_TIME.mul_f64(state.random.random::<f64>());
         let other = question.sample + 1;
@@ -232,7 +233,7 @@ impl Process {
         }
     }
 
-    /// Takes the lines that have arrived until `until`, the earliest first.
+    /// Takes the earliest arrival, if it is not later than `until`.
     fn take(&mut self, until: Duration) -> Option<(Duration, Arrival)> {
         let first = self.pipe.first_entry().filter(|first| first.key().0 <= until.as_nanos())?;
         let at = Duration::from_nanos(u64::try_from(first.key().0).unwrap());
@@ -246,8 +247,8 @@ impl Process {
 }
 
 impl Peer for Process {
-    /// Like the process of the operating system: a line that has arrived before the question is a
-    /// line without a question.
+    /// Treats a line that arrived before the question as a line without a question, as for a process of
+    /// the operating system.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         let shared = Arc::clone(&self.state);
         let mut state = lock(&shared);

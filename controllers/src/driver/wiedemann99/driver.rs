@@ -122,7 +122,7 @@ pub(crate) fn default_desired_mps(input: &DriverInput<'_>) -> f64 {
 
 /// Returns `requested_mps2`, or at most the acceleration with released accelerator if a near
 /// vehicle ahead shows its brake light.
-pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
+fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
         Some(vehicle)
             if vehicle.brake_light

@@ -58,7 +58,7 @@ pub enum Regime {
 
 impl Regime {
     /// Returns true if the driver has noticed the closing and reacts to it.
-    pub(super) fn is_closing(self) -> bool {
+    fn is_closing(self) -> bool {
         matches!(self, Self::Approaching | Self::Emergency)
     }
 }

@@ -113,7 +113,7 @@ impl MisSettings {
     /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors
     /// to the rear confirm and classify a car (the data sheet of the simulated LiDAR states 200 m
     /// on good targets); 120 to 200 are plausible.
-    pub const EXTENDED_ENGAGE_GAP_M: f64 = 150.0;
+    const EXTENDED_ENGAGE_GAP_M: f64 = 150.0;
 
     /// Strongest braking of the extended system (m/s²): an assumption. ISO 15622 allows an adaptive
     /// cruise control 3.5 m/s² at highway speeds; the system uses little more than half of it,
@@ -125,17 +125,17 @@ impl MisSettings {
     /// lane changes must leave to the vehicle behind in UN Regulation No. 79 (1 s, once speeds are
     /// equal); 0.5 to 2 are plausible. A rear vehicle that cannot pull out stays behind an ego that
     /// has become slower.
-    pub const EXTENDED_FOLLOWER_HEADWAY_S: f64 = 1.0;
+    const EXTENDED_FOLLOWER_HEADWAY_S: f64 = 1.0;
 
     /// Front time headway that the extended system gains (s): an assumption; 2 (the paper's gain) to
     /// 2.5 are plausible. The reserve is for rear vehicles that arrive before the prediction. With
     /// 2.5 s the ego loses 1 s in a mean encounter.
-    pub const EXTENDED_THW_GAIN_S: f64 = 2.25;
+    const EXTENDED_THW_GAIN_S: f64 = 2.25;
 
     /// Speed deficit to the lead vehicle from which on the extended system takes no more speed (m/s):
     /// an assumption; 7 to 10 are plausible. The gain of 2 s needs about 8 m/s. Requirement MIS-6
     /// allows 10 m/s, to which the release of the brake adds about 1 m/s.
-    pub const EXTENDED_MAX_DEFICIT_MPS: f64 = 8.0;
+    const EXTENDED_MAX_DEFICIT_MPS: f64 = 8.0;
 
     /// Returns the settings of the extended system: it engages earlier, gains the margin at once
     /// instead of just in time, may brake harder, does not act if another vehicle closes the way of

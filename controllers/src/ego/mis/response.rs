@@ -86,7 +86,8 @@ struct Segment {
 
 impl BrakingResponse {
     /// Braking that takes effect at once, starting from none.
-    pub const IMMEDIATE: Self = Self {
+    #[cfg(test)]
+    pub(super) const IMMEDIATE: Self = Self {
         commanded_mps2: 0.0,
         braking_mps2: 0.0,
         build_up_mps3: f64::INFINITY,

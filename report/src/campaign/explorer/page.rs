@@ -92,8 +92,8 @@ pub fn explorer_page(saved: &SavedCampaign, place: &PagePlace, command_for: Comm
     let mut unfinished = None;
     for record in saved.folder().complete_records()? {
         let record = match record {
-            Err(FolderError::Incomplete { has, of, .. }) => {
-                unfinished = Some(Unfinished { has, of });
+            Err(FolderError::Incomplete { has, planned, .. }) => {
+                unfinished = Some(Unfinished { has, of: planned });
                 break;
             }
             record => record?,

@@ -65,7 +65,7 @@ fn with_names(names: &[String], rows: &str) -> String {
     let mut named = String::with_capacity(rows.len());
     let mut column = 0;
     for (index, part) in rows.split_inclusive("<t").enumerate() {
-        // Each part but the first follows the begin of an element.
+        // Each part but the first follows the beginning of an element.
         let is_element = |name: char| index > 0 && part.starts_with(name) && part[1..].starts_with([' ', '>']);
         if is_element('r') {
             column = 0;

@@ -126,8 +126,8 @@ impl InfluenceCounts {
             (_, Variation::Discrete) => {
                 return Err("the parameters take few values, so that samples repeat each other");
             }
-            (Design::Grid, _) => return Err("the points of a grid are no random samples"),
-            (Design::Coverage, _) => return Err("samples that visit bins in turn are no random samples"),
+            (Design::Grid, _) => return Err("the points of a grid are not random samples"),
+            (Design::Coverage, _) => return Err("samples that visit bins in turn are not random samples"),
             (Design::Random | Design::Sobol, Variation::Continuous) => {}
         }
         Ok(self.events.iter().zip(&self.counts).map(|(event, counts)| self.of_event(*event, counts)).collect())

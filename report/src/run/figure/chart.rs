@@ -10,7 +10,7 @@ pub(super) const INK: &str = "#222222";
 /// Colour of grid lines.
 pub(super) const FAINT: &str = "#dddddd";
 /// Colour of the lines that mark moments.
-pub(super) const MOMENT: &str = "#8a8a8a";
+const MOMENT: &str = "#8a8a8a";
 /// Colour of reference levels, which are solid and thin: the curves of a baseline are dashed.
 const LIMIT: &str = "#d62728";
 const TICK_FONT_SIZE_PX: f64 = 10.0;

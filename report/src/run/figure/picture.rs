@@ -101,7 +101,7 @@ impl PictureFile {
 /// Parses the width of a picture (mm).
 ///
 /// # Errors
-/// A message if the text is no number, or not within these widths.
+/// A message if the text is not a number, or not within these widths.
 pub fn parse_width_mm(text: &str) -> Result<f32, String> {
     let [least, most] = WIDTHS_MM;
     match text.parse::<f32>() {

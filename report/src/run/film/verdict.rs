@@ -116,7 +116,7 @@ pub(in crate::run) fn headways(outcome: &Outcome) -> String {
 }
 
 /// Largest headway that is written in full (s). Beyond it the vehicles do not influence each other.
-pub(in crate::run) const MAX_WRITTEN_THW_S: f64 = 10.0;
+const MAX_WRITTEN_THW_S: f64 = 10.0;
 
 /// Returns a headway as text. A standing follower would otherwise have a headway of hours.
 pub(in crate::run) fn headway_text(thw_s: f64) -> String {

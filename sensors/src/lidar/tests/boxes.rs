@@ -58,7 +58,8 @@ fn each_vehicle_forms_one_cluster() {
             .with(VehicleClass::Motorcycle, 60.0 - along, 3.75)
             .with(VehicleClass::Car, 25.0 + 1.2 * along, 3.75);
         setup.detect(&mut lidar, step.into());
-        lidar.add_to_report(&mut report);
+        let clusters = (0..lidar.detections().len()).map(|detection| lidar.point_indices_of(detection));
+        report.observe(lidar.truth(), clusters);
     }
     assert!(report.vehicles > 180, "{report:?}");
     let share = |count: usize| count as f64 / report.vehicles as f64;

@@ -317,7 +317,7 @@ impl Child {
             Ok(Line::Whole(line)) => Err(ExecError::OutOfTurn { answered: self.answered, line: excerpt(&line) }),
             Ok(Line::TooLong) => Err(ExecError::LongLine { limit: MAX_LINE_BYTES }),
             Err(RecvTimeoutError::Disconnected) => Err(self.exit_error()),
-            // The begin of a line: its end may come as an answer.
+            // The beginning of a line: its end may come as an answer.
             Err(RecvTimeoutError::Timeout) => Ok(()),
         }
     }

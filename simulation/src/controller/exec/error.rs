@@ -81,14 +81,14 @@ pub enum ExecError {
         line: String,
     },
     /// The process answered another question than the one it was asked.
-    #[error("the process answered {line:?} for the control step at {found} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
+    #[error("the process answered {line:?} for the control step at {actual} ns, and was asked for the one at {expected} ns, {}", when(*answered))]
     OtherStep {
         /// The beginning of the line.
         line: String,
         /// The time of the control step (ns).
         expected: i64,
         /// The time that the answer repeats.
-        found: String,
+        actual: String,
         /// Number of answers before, including the greeting.
         answered: u64,
     },
@@ -113,7 +113,7 @@ pub enum ExecError {
         reason: String,
     },
     /// A key is absent, or its value has the wrong type.
-    #[error("the process answered {line:?}: `{key}` must be {expected}, it is {found}")]
+    #[error("the process answered {line:?}: `{key}` must be {expected}, it is {actual}")]
     Key {
         /// The beginning of the line.
         line: String,
@@ -122,7 +122,7 @@ pub enum ExecError {
         /// What is allowed.
         expected: &'static str,
         /// What was found.
-        found: String,
+        actual: String,
     },
     /// The acceleration is not a finite number.
     #[error("the process asked for an acceleration of {value} m/s², which is not a finite number")]
@@ -131,12 +131,12 @@ pub enum ExecError {
         value: String,
     },
     /// The process uses another version of the protocol.
-    #[error("the process speaks version {found} of the protocol, this is version {own}")]
+    #[error("the process speaks version {actual} of the protocol, this is version {supported}")]
     Version {
         /// The version of the process.
-        found: String,
+        actual: String,
         /// The version of Closecall.
-        own: u32,
+        supported: u32,
     },
     /// The process exceeded its memory limit.
     #[error("the process holds more than the {limit_mib} MiB of memory allowed")]

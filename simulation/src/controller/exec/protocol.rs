@@ -73,7 +73,7 @@ pub(crate) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
         };
         Ok(Identity { name: stated("name"), version: stated("version") })
     } else {
-        Err(ExecError::Version { found: version.to_string(), own: PROTOCOL })
+        Err(ExecError::Version { actual: version.to_string(), supported: PROTOCOL })
     }
 }
 
@@ -99,7 +99,7 @@ pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecErro
         return Err(ExecError::OtherStep {
             line,
             expected: asked.time_ns,
-            found: repeated_time,
+            actual: repeated_time,
             answered: asked.answered,
         });
     }
@@ -140,7 +140,7 @@ fn not_finite(line: &[u8]) -> Option<String> {
 /// Returns the error that `key` does not have the `expected` value.
 fn key_error(line: &[u8], object: &Map<String, Value>, key: &'static str, expected: &'static str) -> ExecError {
     let value = object.get(key).map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
-    ExecError::Key { line: excerpt(line), key, expected, found: value }
+    ExecError::Key { line: excerpt(line), key, expected, actual: value }
 }
 
 #[cfg(test)]

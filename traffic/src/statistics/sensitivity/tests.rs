@@ -199,9 +199,9 @@ fn the_interval_of_an_effect_that_is_seldom_seen_does_not_begin_below_0() {
     let design = Trajectories::new(3, 10, &mut StdRng::seed_from_u64(6));
     let outputs: Vec<Option<f64>> =
         (0..design.len()).map(|index| Some(f64::from(u8::from(design.point(index)[0] > 0.93)))).collect();
-    let found = design.effects(&outputs)[0].mu_star.unwrap();
-    assert!(found.value > 0.0, "the effect is seen");
-    assert!(found.interval_95[0] > 0.0 && found.covers(found.value), "{found:?}");
+    let mu_star = design.effects(&outputs)[0].mu_star.unwrap();
+    assert!(mu_star.value > 0.0, "the effect is seen");
+    assert!(mu_star.interval_95[0] > 0.0 && mu_star.covers(mu_star.value), "{mu_star:?}");
 }
 
 #[test]
