@@ -217,7 +217,7 @@ const told = (columns, row) => {
   if (of('duration_s') === null) return 'no outcome';
   const [first, second, closed] = ['first', 'second'].map(which => of(`collision_between_${which}`)).concat(of('collision_closed_by'));
   const [striking, struck] = closed === 'second' ? [second, first] : [first, second];
-  const parts = [first === null || second === null ? 'no collision' : closed === 'both' ? `${first} and ${second} struck each other` : `${striking} struck ${struck}`];
+  const parts = [first === null || second === null ? 'no collision' : closed === 'first' || closed === 'second' ? `${striking} struck ${struck}` : `${first} and ${second} collided`];
   for (const [word, name, unit] of [['at', 'collision_relative_speed_mps', ' m/s'], ['at', 'collision_time_s', ' s']])
     if (of(name) !== null && first !== null) parts[0] += ` ${word} ${of(name)}${unit}`;
   for (const [word, name] of [['reason of the MIS', 'mis_reason'], ['cause', 'cause']]) if (of(name) !== null) parts.push(`${word}: ${of(name)}`);
