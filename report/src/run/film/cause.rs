@@ -40,10 +40,10 @@ impl Film {
     /// Returns who struck whom in each collision, and by whom it was avoidable.
     pub(in crate::run) fn avoidable_texts(&self) -> Vec<String> {
         let Some(sentence) = self.sentence() else { return Vec::new() };
-        let text = |(collision, avoidable): (&Collision, &Option<Avoidable>)| {
+        let text = |(collision, avoidable): (&Collision, Option<Avoidable>)| {
             avoidable.map(|avoidable| format!("{}; avoidable by: {}", sentence.who(collision), avoidable.words()))
         };
-        self.collisions().iter().zip(&self.avoidable).filter_map(text).collect()
+        self.collisions().iter().zip(self.avoidable.iter().copied()).filter_map(text).collect()
     }
 
     /// Returns the letter of a vehicle, or its name if it has none.
