@@ -98,11 +98,11 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     placed
 }
 
-/// Returns a label for each confirmed rear track that belongs to no vehicle. It lies on the other side of
-/// the road than the names of the vehicles behind.
+/// Returns a label for each shown track that belongs to no vehicle. It lies below the road.
 fn false_tracks(canvas: &Canvas<'_>, frame: &Frame) -> Vec<Name> {
     let (labelled_m, width_m) = (canvas.labelled_m(), canvas.label_m(NO_VEHICLE.chars().count()));
-    let is_false = |track: &&Track| is_shown_track(track) && !belongs_to_a_vehicle(canvas.film, frame, track);
+    let is_false =
+        |track: &&Track| is_shown_track(canvas.film, frame, track) && !belongs_to_a_vehicle(canvas.film, frame, track);
     let positions = frame.tracks.iter().filter(is_false).map(Track::x_m);
     let shown = positions.filter(|x_m| *x_m > labelled_m[0] && *x_m < labelled_m[1]);
     shown.map(|x_m| Name { x_m, is_above: false, text: NO_VEHICLE.to_owned(), shorter: Vec::new(), width_m }).collect()

@@ -663,6 +663,14 @@ fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
     assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
     let verdict = summary::verdict(&[film]);
     assert!(verdict.contains("the MIS engaged for a vehicle that does not exist at 2."), "{verdict}");
+    for ghost in ["faults/surround-ghost", "faults/front-radar-ghost"] {
+        let film = filmed(ghost, ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+        let labels = names_from_above(&chunks(&[film], StoreKind::Recording));
+        assert!(labels.iter().any(|label| label == "does not exist"), "{ghost}: {} labels", labels.len());
+    }
+    let truck = filmed("traffic/trucks-alongside", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+    let beside = names_from_above(&chunks(&[truck], StoreKind::Recording));
+    assert!(!beside.iter().any(|label| label == "does not exist"), "a truck beside the ego exists");
     let healthy = chunks(&[default_film()], StoreKind::Recording);
     assert!(!healthy.iter().any(|chunk| texts(chunk, "Points2D:labels").iter().any(|label| label == "does not exist")));
 }
