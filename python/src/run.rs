@@ -20,7 +20,7 @@ use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::perception::try_program;
 use closecall_simulation::trajectories::TraceRecorder;
 use closecall_simulation::{Arm, ControllerFactory, Observer, RunEvent, RunKey, SampleError, SettlingView, StepView};
-use closecall_traffic::Time;
+use closecall_traffic::{Time, VehicleState};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -115,6 +115,10 @@ impl Observer for Recorders {
 
     fn event(&mut self, time: Time, what: &RunEvent) {
         self.film.event(time, what);
+    }
+
+    fn moved(&mut self, time: Time, vehicles: &mut dyn Iterator<Item = VehicleState>) {
+        self.film.moved(time, vehicles);
     }
 }
 

@@ -147,6 +147,12 @@ fn a_failing_sample_is_found_looked_at_and_opened_in_the_viewer() {
     for part in ["struck E", "without MIS", "with MIS", "Parameters", "closecall replay"] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
+    // Both roads stand in one window, below the buttons and the verdict.
+    let height_px = page.evaluate(
+        "(() => { const roads = [...document.querySelectorAll('#sample .incident figure > svg:first-child')] \
+         .map(svg => svg.getBoundingClientRect()); return roads.at(-1).bottom - roads[0].top; })()",
+    );
+    assert!((50.0..640.0).contains(&height_px.as_f64().unwrap()), "{height_px}");
     page.evaluate(
         "[...document.querySelectorAll('#sample button')].find(one => one.innerText === 'Passing twin').click()",
     );
@@ -187,7 +193,13 @@ fn the_file_needs_no_server_and_links_to_the_recorded_samples() {
     assert_eq!(links.len(), 2);
     assert!(links.iter().all(|link| out.join(link).is_file()), "{links:?}");
     let shown = page.evaluate("document.getElementById('sample').innerText");
-    assert!(!shown.as_str().unwrap().contains("Open in Rerun"), "a file runs nothing");
+    let shown = shown.as_str().unwrap();
+    assert!(!shown.contains("Open in Rerun"), "a file runs nothing");
+    // Nobody is asked for the sample, and the page says what happened and why all the same.
+    let (told, _) = shown.split_once("Parameters").unwrap();
+    for part in ["acc: ", "mis: ", " struck ego at ", "reason of the MIS: "] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
     assert_eq!(requests_but(&mut page, "file:"), Vec::<String>::new());
     assert_eq!(page.errors(), Vec::<String>::new());
 }

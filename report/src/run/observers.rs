@@ -3,7 +3,7 @@
 use crate::exchange::OsiRecorder;
 use crate::tables::RunTables;
 use closecall_simulation::{Observer, RunEvent, SettlingView, StepView};
-use closecall_traffic::Time;
+use closecall_traffic::{Time, VehicleState};
 
 use super::film::FilmRecorder;
 
@@ -45,6 +45,12 @@ impl Observer for RunObservers<'_> {
         }
         if let Some(osi) = &mut self.osi {
             osi.event(time, event);
+        }
+    }
+
+    fn moved(&mut self, time: Time, vehicles: &mut dyn Iterator<Item = VehicleState>) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.moved(time, vehicles);
         }
     }
 }

@@ -149,8 +149,8 @@ impl Effects for LidarFault {
         those([
             (self.is_dead, "dead".to_owned()),
             (self.is_frozen, "frozen".to_owned()),
-            (self.lost_frames > 0.0, format!("loses {} of its scans", percent(self.lost_frames))),
-            (self.dropout > 0.0, format!("loses {} of its points", percent(self.dropout))),
+            (self.lost_frames > 0.0, format!("with {} of the scans lost", percent(self.lost_frames))),
+            (self.dropout > 0.0, format!("with {} of the points lost", percent(self.dropout))),
             (self.blocked_deg.iter().any(Option::is_some), "partly blocked".to_owned()),
             (self.window_transmission < 1.0, format!("dirty ({} pass)", percent(self.window_transmission))),
             (self.delay_s > 0.0 || self.jitter_s > 0.0, late(self.delay_s, self.jitter_s)),
@@ -180,14 +180,14 @@ impl Effects for CameraFault {
 impl Effects for ObjectFault {
     fn effects(&self) -> Vec<String> {
         let ghost = self.ghost.map_or_else(String::new, |[gap_m, _]| {
-            format!("reports a ghost {gap_m:.0} m away, a vehicle that does not exist")
+            format!("with a ghost {gap_m:.0} m away (a vehicle that does not exist)")
         });
         let is_noisy = self.noise_m != [0.0; 2] || self.speed_noise_mps > 0.0;
         those([
             (self.is_dead, "dead".to_owned()),
             (self.is_frozen, "frozen".to_owned()),
-            (self.lost_frames > 0.0, format!("loses {} of its scans", percent(self.lost_frames))),
-            (self.dropout > 0.0, format!("loses {} of its measurements", percent(self.dropout))),
+            (self.lost_frames > 0.0, format!("with {} of the scans lost", percent(self.lost_frames))),
+            (self.dropout > 0.0, format!("with {} of the measurements lost", percent(self.dropout))),
             (self.blocked_deg.iter().any(Option::is_some), "partly blocked".to_owned()),
             (self.range_share < 1.0, format!("dirty ({} of the range left)", percent(self.range_share))),
             (self.delay_s > 0.0 || self.jitter_s > 0.0, late(self.delay_s, self.jitter_s)),
@@ -209,10 +209,10 @@ impl Effects for RadarFault {
 
     fn effects(&self) -> Vec<String> {
         let ghost =
-            self.ghost.map(|[gap_m, _]| format!("detects a ghost {gap_m:.0} m away, a vehicle that does not exist"));
+            self.ghost.map(|[gap_m, _]| format!("with a ghost {gap_m:.0} m away (a vehicle that does not exist)"));
         those([
             (self.is_dead, "dead".to_owned()),
-            (self.dropout > 0.0, format!("loses {} of its detections", percent(self.dropout))),
+            (self.dropout > 0.0, format!("with {} of the detections lost", percent(self.dropout))),
             (self.blocked_deg.iter().any(Option::is_some), "partly blocked".to_owned()),
             (self.range_share < 1.0, format!("dirty ({} of the range left)", percent(self.range_share))),
             (self.delay_s > 0.0, late(self.delay_s, 0.0)),

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use closecall_campaign::runner::run_guarded;
 use closecall_controllers::{EgoController, EgoSettings, EgoState, R157Driver};
 use closecall_scenarios::outcome::{ClosedBy, Collision, Moment, Outcome, Phase};
 use closecall_scenarios::{Scenario, Setting};
 use closecall_sensors::SensorMode;
-use closecall_simulation::{Arm, ControllerFactory, NoObserver};
+use closecall_simulation::{Arm, ControllerFactory, NoObserver, RunKey};
 use closecall_traffic::geometry::BoxSide;
-use closecall_traffic::{ActorId, GRAVITY_MPS2, PHYSICS_STEP};
+use closecall_traffic::{ActorId, GRAVITY_MPS2, VehicleState};
 use serde::{Deserialize, Serialize};
 
 use super::Trace;
@@ -148,48 +149,62 @@ pub fn attribute(case: &Case, settings: &[Setting]) -> Result<(Outcome, Option<A
     let mut trace = Trace::default();
     let outcome = case.run_as(settings, &case.arm, &mut trace)?;
     let Some(collision) = outcome.collisions.first() else { return Ok((outcome, None)) };
-    let careful = Arm { controller: Arc::new(CarefulEgo), sensors: Some(SensorMode::GroundTruth) };
-    let as_ego = case.run_as(settings, &careful, &mut NoObserver).ok().map(|outcome| !fails(&outcome));
-    let attribution = of_collision(collision, &outcome, &scenario, &trace, as_ego);
+    let as_ego = careful_ego_avoids(&scenario, case.key());
+    let attribution = avoidable(collision, &scenario, case.key(), &trace.states, as_ego)
+        .map(|avoidable| of_collision(collision, &outcome, trace.ego_state, avoidable));
     Ok((outcome, attribution))
 }
 
-fn of_collision(
+/// Returns whether no vehicle collides with the competent and careful driver of UN Regulation 157 in
+/// the place of the ego; `None` if this run has no outcome.
+pub(super) fn careful_ego_avoids(scenario: &Scenario, key: RunKey) -> Option<bool> {
+    let careful = Arm { controller: Arc::new(CarefulEgo), sensors: Some(SensorMode::GroundTruth) };
+    run_guarded(scenario, key, &careful, &mut NoObserver).ok().map(|outcome| !fails(&outcome))
+}
+
+/// Returns how a collision was avoidable; `None` if one of its vehicles is not in the scenario.
+/// `states` are the states of all vehicles at each physics step up to the collision.
+pub(super) fn avoidable(
     collision: &Collision,
-    outcome: &Outcome,
     scenario: &Scenario,
-    trace: &Trace,
+    key: RunKey,
+    states: &[Vec<VehicleState>],
     careful_as_ego: Option<bool>,
-) -> Option<Attribution> {
+) -> Option<Avoidable> {
     let roles = collision.roles();
-    let party = |role: usize| Party { actor: collision.between[role].clone(), side: collision.struck_side[role] };
     let index = |role: usize| scenario.actors.iter().position(|actor| actor.id == collision.between[role]);
     let indices = [index(roles[0])?, index(roles[1])?];
-    let vehicles = indices.map(|index| scenario.actors[index].vehicle);
+    let vehicles = indices.map(|index| scenario.vehicle(index, key));
     let sides = roles.map(|role| collision.struck_side[role]);
-    let pair = Pair { trace, step_s: PHYSICS_STEP.s(), indices, vehicles, sides };
+    let pair = Pair { states, step_s: scenario.physics_step.s(), indices, vehicles, sides };
     let full_mps2 = scenario.environment.friction * GRAVITY_MPS2;
     let full_from_hazard = pair.is_avoided(Braking::FullFromHazard(full_mps2));
     let full_from_start = match full_from_hazard {
         Some(true) => Some(true),
         _ => pair.is_avoided(Braking::FullFromStart(full_mps2)),
     };
-    Some(Attribution {
+    Some(Avoidable {
+        careful_in_striking: pair.is_avoided(Braking::Careful),
+        careful_as_ego,
+        full_braking_from_hazard: full_from_hazard,
+        full_braking_from_start: full_from_start,
+    })
+}
+
+fn of_collision(collision: &Collision, outcome: &Outcome, ego_state: EgoState, avoidable: Avoidable) -> Attribution {
+    let roles = collision.roles();
+    let party = |role: usize| Party { actor: collision.between[role].clone(), side: collision.struck_side[role] };
+    Attribution {
         time_s: collision.time.s(),
         striking: party(roles[0]),
         struck: party(roles[1]),
         is_mutual: collision.closed_by == ClosedBy::Both,
         phase: collision.phase,
         is_after_lead_braking: outcome.moment(Moment::FrontBrakes).is_some_and(|time| time <= collision.time),
-        ego_state: trace.ego_state,
+        ego_state,
         relative_speed_mps: collision.relative_speed_mps,
         delta_v_mps: collision.delta_v_mps[0].max(collision.delta_v_mps[1]),
         further_collisions: outcome.collisions.len() - 1,
-        avoidable: Avoidable {
-            careful_in_striking: pair.is_avoided(Braking::Careful),
-            careful_as_ego,
-            full_braking_from_hazard: full_from_hazard,
-            full_braking_from_start: full_from_start,
-        },
-    })
+        avoidable,
+    }
 }

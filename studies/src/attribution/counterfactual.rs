@@ -4,8 +4,6 @@ use closecall_controllers::reference::{BrakingReaction, CRITICAL_TTC_S};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Vehicle, VehicleState};
 
-use super::Trace;
-
 /// Time for which the motion is continued beyond the collision (s). Full braking from any speed on
 /// a motorway ends earlier.
 const BEYOND_S: f64 = 15.0;
@@ -28,7 +26,8 @@ pub(super) enum Braking {
 /// The two vehicles of a collision.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair<'a> {
-    pub(super) trace: &'a Trace,
+    /// The states of all vehicles at each step up to the collision.
+    pub(super) states: &'a [Vec<VehicleState>],
     /// Step of the simulation (s).
     pub(super) step_s: f64,
     /// Index of the striking and of the struck vehicle in the list of actors.
@@ -46,16 +45,16 @@ impl Pair<'_> {
         if self.sides != [BoxSide::Front, BoxSide::Rear] {
             return None;
         }
-        let first = self.trace.states.first()?;
+        let first = self.states.first()?;
         let [striking, struck] = self.indices;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "15 s in steps of 10 ms")]
-        let steps = self.trace.states.len() + (BEYOND_S / self.step_s) as usize;
+        let steps = self.states.len() + (BEYOND_S / self.step_s) as usize;
         let hazard = self.hazard_step();
         let mut striking_state = first[striking];
         let mut last_of_other = first[struck];
         let (mut reaction, mut differs) = (None::<BrakingReaction>, false);
         for step in 0..steps {
-            let recorded = self.trace.states.get(step);
+            let recorded = self.states.get(step);
             if recorded.is_none() && !differs {
                 // The vehicle drives unchanged up to the contact, and the contact follows.
                 return Some(false);
@@ -118,7 +117,7 @@ impl Pair<'_> {
     /// time to collision falls to the 2 s of the careful driver, whichever comes first.
     fn hazard_step(&self) -> Option<usize> {
         let [striking, struck] = self.indices;
-        self.trace.states.iter().position(|states| {
+        self.states.iter().position(|states| {
             let (striking_state, other) = (&states[striking], &states[struck]);
             let closing_mps = striking_state.speed_mps - other.speed_mps;
             other.brake_light
@@ -138,7 +137,7 @@ impl Pair<'_> {
     /// Returns the lateral position of the striking vehicle at `s_m` of its path.
     fn lateral_m(&self, s_m: f64) -> f64 {
         let [striking, _] = self.indices;
-        let states = &self.trace.states;
+        let states = self.states;
         let next = states.partition_point(|states| states[striking].s_m < s_m);
         states.get(next).or(states.last()).map_or(0.0, |states| states[striking].d_m)
     }
@@ -177,6 +176,7 @@ fn continued(state: &VehicleState, step_s: f64) -> VehicleState {
 mod tests {
     use closecall_traffic::{Time, VehicleClass};
 
+    use super::super::Trace;
     use super::*;
 
     const STEP_S: f64 = 0.01;
@@ -213,7 +213,7 @@ mod tests {
 
     fn decided(trace: &Trace, sides: [BoxSide; 2], braking: Braking) -> Option<bool> {
         let vehicles = [Vehicle::typical(VehicleClass::Car); 2];
-        Pair { trace, step_s: STEP_S, indices: [0, 1], vehicles, sides }.is_avoided(braking)
+        Pair { states: &trace.states, step_s: STEP_S, indices: [0, 1], vehicles, sides }.is_avoided(braking)
     }
 
     #[test]

@@ -13,10 +13,14 @@
 //! standstill, and its lane position. The counterfactual of the ego is a run of the loop, in which
 //! the other drivers react to the other ego. In a rear-end collision, the braking of the striking
 //! vehicle decides. About other contacts, the counterfactuals of the striking vehicle say nothing.
+//!
+//! An explanation has the first collision; a recording has every one ([`Motion`]).
 
 mod collision;
 mod counterfactual;
+mod motion;
 mod trace;
 
 pub use collision::{Attribution, Avoidable, Party, attribute, braking_words, phase_word, state_word};
+pub use motion::Motion;
 pub use trace::Trace;

@@ -208,6 +208,21 @@ const valueText = (one, row) => {
   const value = one.values[row];
   return Number.isNaN(value) ? '–' : one.words ? one.words[value] : String(Number(value.toPrecision(4)));
 };
+// Who struck whom in one arm, and what its columns say about the reason. A constant column is left out of the page, and of the sentence.
+const told = (columns, row) => {
+  const of = name => {
+    const one = columns.find(column => column.name === name);
+    return one && !Number.isNaN(one.values[row]) ? valueText(one, row) : null;
+  };
+  if (of('duration_s') === null) return 'no outcome';
+  const [first, second, closed] = ['first', 'second'].map(which => of(`collision_between_${which}`)).concat(of('collision_closed_by'));
+  const [striking, struck] = closed === 'second' ? [second, first] : [first, second];
+  const parts = [first === null || second === null ? 'no collision' : closed === 'first' || closed === 'second' ? `${striking} struck ${struck}` : `${first} and ${second} collided`];
+  for (const [word, name, unit] of [['at', 'collision_relative_speed_mps', ' m/s'], ['at', 'collision_time_s', ' s']])
+    if (of(name) !== null && first !== null) parts[0] += ` ${word} ${of(name)}${unit}`;
+  for (const [word, name] of [['reason of the MIS', 'mis_reason'], ['cause', 'cause']]) if (of(name) !== null) parts.push(`${word}: ${of(name)}`);
+  return parts.join('; ');
+};
 const table = (heads, rows) => made('div', { className: 'wide', tabIndex: 0 }, made('table', {},
   made('thead', {}, made('tr', {}, ...heads.map(text => made('th', {}, text)))),
   made('tbody', {}, ...rows.map(cells => made('tr', {}, ...cells.map((text, index) => { const td = made('td', {}, text); td.dataset.name = heads[index]; return td; }))))));
@@ -255,6 +270,7 @@ const show = row => {
   if (recording) said.append('Recorded: ', made('a', { href: recording[1], target: '_blank', rel: 'noopener' }, 'incident card'),
     ...(data.is_served ? [] : [', ', made('a', { href: recording[0] }, recording[0])]));
   if (data.is_served) part(happened, `sample/${name}/${number}`, 'The sample runs again.');
+  else happened.append(made('ul', {}, ...samples.arms.map((name, index) => made('li', {}, `${name}: ${told(samples.outcomes[index], row)}`))));
   history.replaceState(null, '', `#${name}/${number}`);
   panels.filter(panel => panel.y).forEach(drawPlane);
   // The sample stands above the list and, on a narrow page, below the charts.

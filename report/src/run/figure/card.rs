@@ -1,6 +1,6 @@
 //! The incident card of a sample: one page for a ticket, which loads nothing. It has the event and
-//! its cause in one sentence for each arm, both arms from above in real time, the headways, and the
-//! command that runs the sample again.
+//! its cause in one sentence for each arm, by whom each collision was avoidable, both arms from above
+//! in real time, the headways, and the command that runs the sample again.
 //!
 //! The animation is SMIL, part of SVG, and needs no script.
 
@@ -67,6 +67,7 @@ fn sections(films: &[Film], window: Window) -> Markup {
                 @if let Some(sentence) = film.sentence() {
                     p.failure[film.worst_collision().is_some()] { (sentence.to_string()) }
                 }
+                @for text in film.avoidable_texts() { p { (text) } }
                 figure { (road(film, &vehicles(film, window))) (headways(film, window)) }
             }
         }

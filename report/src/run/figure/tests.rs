@@ -64,6 +64,7 @@ fn in_dense_traffic_all_but_ego_lead_and_rear_vehicle_are_grey_and_share_one_ent
     let card = card(&films, "closecall replay . 0");
     assert!(card.len() < 300_000, "{} bytes", card.len());
     assert!(card.contains("R struck E from behind at ") && card.contains("animateTransform"), "{card}");
+    assert!(card.contains("R struck E; avoidable by: "), "{card}");
     assert!(card.contains("closecall replay . 0") && card.matches("<svg").count() == 4);
     for loaded in ["<script", "<link", "<img", "src=", "url(", "http://", "https://", "NaN"] {
         assert!(!card.contains(loaded), "{loaded}");

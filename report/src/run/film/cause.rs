@@ -2,6 +2,7 @@
 
 use closecall_scenarios::causal::CausalSentence;
 use closecall_scenarios::outcome::Collision;
+use closecall_studies::attribution::Avoidable;
 
 use super::{Film, Part};
 
@@ -34,6 +35,15 @@ impl Film {
     pub(in crate::run) fn collision_text(&self, collision: &Collision) -> String {
         let sentence = self.sentence();
         sentence.map_or_else(String::new, |told| format!("{} ({})", told.struck(collision), told.delta_v(collision)))
+    }
+
+    /// Returns who struck whom in each collision, and by whom it was avoidable.
+    pub(in crate::run) fn avoidable_texts(&self) -> Vec<String> {
+        let Some(sentence) = self.sentence() else { return Vec::new() };
+        let text = |(collision, avoidable): (&Collision, Option<Avoidable>)| {
+            avoidable.map(|avoidable| format!("{}; avoidable by: {}", sentence.who(collision), avoidable.words()))
+        };
+        self.collisions().iter().zip(self.avoidable.iter().copied()).filter_map(text).collect()
     }
 
     /// Returns the letter of a vehicle, or its name if it has none.

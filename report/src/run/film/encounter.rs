@@ -45,6 +45,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         acceleration_limits: Vec::new(),
         camera: None,
         outcome: None,
+        avoidable: Vec::new(),
         letters: VehicleLetters::default(),
         faults: Vec::new(),
         highlight: Some(encounter.crossing),

@@ -8,6 +8,7 @@ use closecall_sensors::faults::StatedFault;
 use closecall_sensors::{
     FieldOfView, Health, NoiseKey, RadarReturn, RearImage, Scene, SceneVehicle, SensorAlarms, SensorHealth,
 };
+use closecall_studies::attribution::Avoidable;
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState, maths};
@@ -164,6 +165,8 @@ pub struct Film {
     pub(in crate::run) camera: Option<(Camera, NoiseKey)>,
     /// The outcome; `None` for recorded traffic.
     pub(in crate::run) outcome: Option<Outcome>,
+    /// How each collision of the outcome was avoidable, in its order; `None` if undetermined.
+    pub(in crate::run) avoidable: Vec<Option<Avoidable>>,
     /// The letters of the vehicles in texts.
     pub(in crate::run) letters: VehicleLetters,
     /// The faults that were injected.

@@ -4,7 +4,8 @@ use closecall_controllers::{CheckedDriver, EgoSettings};
 use closecall_sensors::camera::Pipeline;
 use closecall_sensors::lidar::RearLidar;
 use closecall_sensors::{Detection, NoiseKey, RadarReturn, SensorMode};
-use closecall_traffic::Time;
+use closecall_studies::attribution::Motion;
+use closecall_traffic::{Time, VehicleState};
 
 use super::knowledge::rear_seen;
 use super::{Film, FilmActor, Frame, Level, Limit, Part, Scan};
@@ -32,6 +33,9 @@ const MAX_DENSE_SCANS: usize = 24;
 /// Observes a run and records its film.
 pub struct FilmRecorder {
     film: Film,
+    /// The scenario and the run, for the other driver in the place of the ego.
+    run: (Scenario, RunKey),
+    motion: Motion,
     dense_scan_count: usize,
     /// The kept scans of each LiDAR: the number of new scans until the next kept one in all phases,
     /// and whether to keep the next scan of the two phases.
@@ -88,13 +92,15 @@ impl FilmRecorder {
                 (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego, actors })
             }),
             outcome: None,
+            avoidable: Vec::new(),
             letters: VehicleLetters::of(scenario),
             faults: sensors.stated_faults(),
             highlight: None,
             foreword: String::new(),
             settings: Vec::new(),
         };
-        Self { film, dense_scan_count: 0, due: Vec::new(), smallest_s: f64::INFINITY, closest: None }
+        let (run, motion) = ((scenario.clone(), key), Motion::default());
+        Self { film, run, motion, dense_scan_count: 0, due: Vec::new(), smallest_s: f64::INFINITY, closest: None }
     }
 
     /// Completes the film with the outcome of the run.
@@ -106,6 +112,8 @@ impl FilmRecorder {
             actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
+        let (scenario, key) = &self.run;
+        film.avoidable = self.motion.avoidable(outcome, scenario, *key);
         film.mark_relevant();
         if let Some((index, lidars)) = self.closest
             && let Some(frame) = film.frames.get_mut(index)
@@ -231,5 +239,10 @@ impl Observer for FilmRecorder {
 
     fn event(&mut self, time: Time, event: &RunEvent) {
         self.film.happenings.push((time, event.clone()));
+        self.motion.event(time, event);
+    }
+
+    fn moved(&mut self, time: Time, vehicles: &mut dyn Iterator<Item = VehicleState>) {
+        self.motion.moved(time, vehicles);
     }
 }

@@ -102,6 +102,7 @@ pub fn film_lane_change(
         acceleration_limits: Vec::new(),
         camera: None,
         outcome: None,
+        avoidable: Vec::new(),
         letters: VehicleLetters::default(),
         faults: Vec::new(),
         highlight: critical_time(change),

@@ -22,7 +22,7 @@ use rerun::{LineStrips2D, Points2D};
 use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
-use super::truth::belongs_to_a_vehicle;
+use super::truth::{belongs_to_a_vehicle, is_false_track_of_other_sensors};
 use crate::run::film::{Film, Frame};
 use closecall_scenarios::outcome::{CRITICAL_THW_S, Collision};
 
@@ -36,8 +36,9 @@ const ARROW_S: f64 = 0.5;
 const ABOVE_M: f64 = 4.8;
 /// Room for the names below the road (m in the picture).
 const BELOW_M: f64 = 4.6;
-/// Room for the axis below the last road (m in the picture).
-const AXIS_M: f64 = 4.6;
+/// Room for the axis below the last road (m in the picture). Its numbers hang below it, and take 22
+/// px, which are 5.8 m in a window of 1280 x 720 px.
+const AXIS_M: f64 = 6.4;
 /// Distance of the clock and the names above from the road (m in the picture). A label hangs below
 /// its point.
 const NAMES_ABOVE_M: f64 = 4.4;
@@ -344,8 +345,8 @@ fn write_gaps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Resul
 /// An outline: its corners in the picture, and its colour.
 type Outline = (Vec<[f32; 2]>, Rgba);
 
-/// Writes the outlines of the confirmed rear tracks that are probably vehicles. A track that belongs to
-/// no vehicle has the colour of a false track.
+/// Writes the outlines of the confirmed rear tracks that are probably vehicles, and of all false tracks,
+/// which have a colour of their own.
 fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
     let film = canvas.film;
     let outlines = |frame: &Frame| -> Vec<Outline> {
@@ -359,7 +360,7 @@ fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Res
             let colour = if belongs_to_a_vehicle(film, frame, track) { palette::TRACK } else { palette::FALSE_TRACK };
             (corners.map(corner).to_vec(), colour)
         };
-        frame.tracks.iter().filter(|track| is_shown_track(track)).map(outline).collect()
+        frame.tracks.iter().filter(|track| is_shown_track(film, frame, track)).map(outline).collect()
     };
     let rows: Vec<Vec<Outline>> = film.frames.iter().map(outlines).collect();
     if rows.iter().all(Vec::is_empty) {
@@ -376,9 +377,12 @@ fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Res
     })
 }
 
-/// Returns true for a confirmed rear track that is probably a vehicle.
-fn is_shown_track(track: &Track) -> bool {
-    track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
+/// Returns true for a confirmed rear track that is probably a vehicle, and for a false track of the
+/// other sensors.
+fn is_shown_track(film: &Film, frame: &Frame, track: &Track) -> bool {
+    let is_of_rear =
+        track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5;
+    is_of_rear || is_false_track_of_other_sensors(film, frame, track)
 }
 
 /// Writes a mark on the first vehicle of the worst collision, from the contact on.

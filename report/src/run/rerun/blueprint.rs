@@ -98,8 +98,8 @@ pub(super) fn write(recording: &Recording, films: &[FilmContents], verdict_text:
 fn bird_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 2.6,
-        _ if films.iter().any(|film| film.camera_px.is_some()) => 4.2,
+        [_] => 3.0,
+        _ if films.iter().any(|film| film.camera_px.is_some()) => 5.0,
         _ => 4.6,
     }
 }

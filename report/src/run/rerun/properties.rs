@@ -6,7 +6,7 @@
 //!  __properties/run               scenario, seed, sample, verdict, settings
 //!  __properties/parameters        one value per sampled parameter
 //!  __properties/arms/ARM          collided, smallest headways, when the MIS engaged, what happened in words, and so on
-//!  __properties/arms/ARM/collision_N   each collision: who struck whom, struck sides, ΔV, phase
+//!  __properties/arms/ARM/collision_N   each collision: who struck whom, struck sides, ΔV, phase, by whom it was avoidable
 //! ```
 //!
 //! The unit is in the name of each property, and in the metadata of its column, as the type of the
@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
 use closecall_scenarios::outcome::{Collision, Outcome};
+use closecall_studies::attribution::Avoidable;
 use closecall_traffic::{Measured, Value};
 use rerun::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 
@@ -56,7 +57,7 @@ pub(super) fn write(recording: &Recording, films: &[Film]) -> Result<(), Recordi
         of_arm(film, outcome)?.push(recording, &format!("arms/{}", film.arm))?;
         for (number, collision) in outcome.collisions.iter().enumerate() {
             let entity = format!("arms/{}/collision_{}", film.arm, number + 1);
-            of_collision(collision)?.push(recording, &entity)?;
+            of_collision(collision, film.avoidable.get(number).copied().flatten())?.push(recording, &entity)?;
         }
     }
     Ok(())
@@ -97,9 +98,9 @@ fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> 
 }
 
 /// Returns the properties of one collision.
-fn of_collision(collision: &Collision) -> Result<Properties, RecordingError> {
+fn of_collision(collision: &Collision, avoidable: Option<Avoidable>) -> Result<Properties, RecordingError> {
     let [striking, struck] = collision.roles();
-    Properties::default()
+    let properties = Properties::default()
         .number("time_s", Ok(collision.time.s()))?
         .text("striking", collision.between[striking].as_str())?
         .text("striking_side", side_word(collision.struck_side[striking]))?
@@ -108,7 +109,11 @@ fn of_collision(collision: &Collision) -> Result<Properties, RecordingError> {
         .text("phase", phase_name(collision.phase))?
         .number("relative_speed_mps", Ok(collision.relative_speed_mps))?
         .number("delta_v_striking_mps", Ok(collision.delta_v_mps[striking]))?
-        .number("delta_v_struck_mps", Ok(collision.delta_v_mps[struck]))
+        .number("delta_v_struck_mps", Ok(collision.delta_v_mps[struck]))?;
+    match avoidable {
+        Some(avoidable) => properties.text("avoidable_by", avoidable.words()),
+        None => Ok(properties),
+    }
 }
 
 /// Values of one entity. A value that does not exist has no column.

@@ -73,7 +73,12 @@ impl<'a> Writer<'a> {
 
     /// Returns the share of the time axis that a duration takes.
     pub(super) fn share_of_run(&self, duration: Time) -> f64 {
-        duration.s() / (self.span[1] + self.period - self.span[0]).s()
+        duration.s() / (self.end() - self.span[0]).s()
+    }
+
+    /// Returns the end of the recording: one step after the last frame of its longest film.
+    pub(super) fn end(&self) -> Time {
+        self.span[1] + self.period
     }
 
     /// Returns the path of an entity of this film.

@@ -4,6 +4,9 @@
 //! A vehicle in the field of view of the rear sensor counts as known if the near face of a
 //! confirmed rear track lies within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts
 //! as missed, even if another vehicle hides it.
+//!
+//! A false track is a confirmed track to which no vehicle belongs. For the front sensor and the side
+//! sensors, a vehicle beside the ego has no near face, so its box decides.
 
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus, maths};
@@ -114,21 +117,39 @@ fn compare(film: &Film, frame: &Frame) -> FrameComparison {
         let shape = true_shape(film, actor, pose);
         if is_known { comparison.detected.push(shape) } else { comparison.missed.push(shape) }
     }
-    for track in tracks.iter().filter(|track| track.class.vehicle() > 0.5) {
-        if !belongs_to_a_vehicle(film, frame, track) {
-            comparison.false_tracks.push(track_shape(track));
-        }
-    }
+    let of_rear = tracks.iter().copied().filter(|track| track.class.vehicle() > 0.5);
+    let false_of_rear = of_rear.filter(|track| !belongs_to_a_vehicle(film, frame, track));
+    let of_others = frame.tracks.iter().filter(|track| is_false_track_of_other_sensors(film, frame, track));
+    comparison.false_tracks = false_of_rear.chain(of_others).map(track_shape).collect();
     comparison
+}
+
+/// Returns true if the front sensor or a side sensor reports a vehicle where none is. After a collision
+/// the perception of the ego rests, and its tracks say nothing.
+pub(super) fn is_false_track_of_other_sensors(film: &Film, frame: &Frame, track: &Track) -> bool {
+    let is_reported = track.source != Source::Rear && track.status == TrackStatus::Confirmed;
+    let has_collided = film.worst_collision().is_some_and(|collision| frame.time >= collision.time);
+    is_reported && track.class.vehicle() > 0.5 && !has_collided && !belongs_to_a_vehicle(film, frame, track)
 }
 
 /// Returns true if any vehicle is where the track is.
 pub(super) fn belongs_to_a_vehicle(film: &Film, frame: &Frame, track: &Track) -> bool {
     let is_there = |actor: usize| {
-        let face = face_m(film.in_ego_frame(frame, actor), film.actors[actor].vehicle.dimensions.length_m);
-        are_close(face, track_face_m(track))
+        let (pose, size) = (film.in_ego_frame(frame, actor), &film.actors[actor].vehicle.dimensions);
+        match track.source {
+            Source::Rear => are_close(face_m(pose, size.length_m), track_face_m(track)),
+            Source::Front | Source::Surround => is_near_box(pose, [size.length_m, size.width_m], track),
+        }
     };
     (0..film.actors.len()).any(|actor| actor != film.ego && is_there(actor))
+}
+
+/// Returns true if the centre of a track is in the box of a vehicle (length and width in m), or close to it.
+fn is_near_box([x_m, y_m, yaw_rad]: [f64; 3], size_m: [f64; 2], track: &Track) -> bool {
+    let (dx_m, dy_m) = (track.x_m() - x_m, track.y_m() - y_m);
+    let (sin, cos) = maths::sin_cos(yaw_rad);
+    let from_centre_m = [cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m];
+    (0..2).all(|axis| from_centre_m[axis].abs() <= 0.5 * size_m[axis] + MATCH_DISTANCE_M)
 }
 
 /// Returns the box of a vehicle.

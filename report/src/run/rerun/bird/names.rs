@@ -19,6 +19,8 @@ struct Name {
     x_m: f64,
     is_above: bool,
     text: String,
+    /// Texts for a row with less room, the longest last.
+    shorter: Vec<String>,
     /// Room that the name takes, with the distance to the next (m in the picture).
     width_m: f64,
 }
@@ -75,9 +77,10 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
             let is_shown = x_m > labelled_m[0] && x_m < labelled_m[1];
             let is_above = actor != film.ego && (x_m < 0.0 || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m());
             let headway = if has_collided { String::new() } else { headway_of(frame, actor) };
-            let text = format!("{label} {:.1} m/s{headway}", state.speed_mps);
+            let moving = format!("{label} {:.1} m/s", state.speed_mps);
+            let text = format!("{moving}{headway}");
             let width_m = canvas.label_m(text.chars().count());
-            is_shown.then_some(Name { x_m, is_above, text, width_m })
+            is_shown.then_some(Name { x_m, is_above, text, shorter: vec![label, moving], width_m })
         })
         .collect();
     names.extend(false_tracks(canvas, frame));
@@ -87,10 +90,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         let room_m = [labelled_m[0] + clock_m, labelled_m[1] - mark_m];
         let (mut of_row, rest): (Vec<Name>, Vec<Name>) = names.into_iter().partition(|name| name.is_above == is_above);
         names = rest;
-        // The names are in the order of their rank. A name without room is left out.
-        while of_row.len() > 1 && of_row.iter().map(|name| name.width_m).sum::<f64>() > room_m[1] - room_m[0] {
-            of_row.pop();
-        }
+        make_room(&mut of_row, room_m[1] - room_m[0], |letters| canvas.label_m(letters));
         of_row.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
         keep_apart(room_m, &mut of_row);
         placed.extend(of_row);
@@ -98,14 +98,14 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     placed
 }
 
-/// Returns a label for each confirmed rear track that belongs to no vehicle. It lies on the other side of
-/// the road than the names of the vehicles behind.
+/// Returns a label for each shown track that belongs to no vehicle. It lies below the road.
 fn false_tracks(canvas: &Canvas<'_>, frame: &Frame) -> Vec<Name> {
     let (labelled_m, width_m) = (canvas.labelled_m(), canvas.label_m(NO_VEHICLE.chars().count()));
-    let is_false = |track: &&Track| is_shown_track(track) && !belongs_to_a_vehicle(canvas.film, frame, track);
+    let is_false =
+        |track: &&Track| is_shown_track(canvas.film, frame, track) && !belongs_to_a_vehicle(canvas.film, frame, track);
     let positions = frame.tracks.iter().filter(is_false).map(Track::x_m);
     let shown = positions.filter(|x_m| *x_m > labelled_m[0] && *x_m < labelled_m[1]);
-    shown.map(|x_m| Name { x_m, is_above: false, text: NO_VEHICLE.to_owned(), width_m }).collect()
+    shown.map(|x_m| Name { x_m, is_above: false, text: NO_VEHICLE.to_owned(), shorter: Vec::new(), width_m }).collect()
 }
 
 /// Returns the headway that belongs to a vehicle, as it follows its speed.
@@ -119,6 +119,24 @@ fn headway_of(frame: &Frame, actor: usize) -> String {
         text(margins.thw_rear_s, "behind")
     } else {
         String::new()
+    }
+}
+
+/// Shortens names, the longest first, until a row has room for all. The names are in the order of
+/// their rank: if none can be shortened, the last is left out.
+fn make_room(names: &mut Vec<Name>, room_m: f64, label_m: impl Fn(usize) -> f64) {
+    while !names.is_empty() && names.iter().map(|name| name.width_m).sum::<f64>() > room_m {
+        let can_shorten = (0..names.len()).filter(|&index| !names[index].shorter.is_empty());
+        let longest = can_shorten.max_by(|&a, &b| names[a].width_m.total_cmp(&names[b].width_m));
+        match longest.and_then(|index| Some((index, names[index].shorter.pop()?))) {
+            Some((index, text)) => {
+                names[index].width_m = label_m(text.chars().count());
+                names[index].text = text;
+            }
+            None => {
+                names.pop();
+            }
+        }
     }
 }
 
@@ -146,7 +164,13 @@ mod tests {
     #[test]
     fn no_name_covers_another_and_none_leaves_its_room() {
         let width_m = |text: &str| 1.2 * text.chars().count() as f64 + 2.0;
-        let name = |x_m, text: &str| Name { x_m, is_above: true, text: text.to_owned(), width_m: width_m(text) };
+        let name = |x_m, text: &str| Name {
+            x_m,
+            is_above: true,
+            text: text.to_owned(),
+            shorter: Vec::new(),
+            width_m: width_m(text),
+        };
         for at_m in [[-34.0, -33.0, -30.0], [70.0, 72.0, 74.0], [0.0, 1.0, 74.0]] {
             let mut names: Vec<Name> = at_m
                 .into_iter()
@@ -159,5 +183,33 @@ mod tests {
             assert!(ends[0][0] >= -20.0 - 1e-9 && ends[2][1] <= 60.0 + 1e-9, "{ends:?}");
             assert!(ends.windows(2).all(|pair| pair[0][1] <= pair[1][0] + 1e-9), "{ends:?}");
         }
+    }
+
+    #[test]
+    fn a_full_row_loses_headways_before_speeds_and_speeds_before_names() {
+        let names = |room_m: f64| -> Vec<String> {
+            let name = |texts: [&str; 3]| Name {
+                x_m: 0.0,
+                is_above: false,
+                text: texts[2].to_owned(),
+                shorter: texts[..2].iter().map(|&text| text.to_owned()).collect(),
+                width_m: texts[2].chars().count() as f64,
+            };
+            let ghost = Name { shorter: Vec::new(), ..name(["", "", NO_VEHICLE]) };
+            let mut row = vec![
+                name(["E ego", "E ego 24.6 m/s", "E ego 24.6 m/s"]),
+                name(["F front", "F front 23.5 m/s", "F front 23.5 m/s · 2.10 s ahead"]),
+                ghost,
+            ];
+            make_room(&mut row, room_m, |letters| letters as f64);
+            assert!(row.iter().map(|name| name.width_m).sum::<f64>() <= room_m.max(0.0), "{room_m}");
+            row.into_iter().map(|name| name.text).collect()
+        };
+        assert_eq!(names(60.0), ["E ego 24.6 m/s", "F front 23.5 m/s · 2.10 s ahead", NO_VEHICLE]);
+        assert_eq!(names(50.0), ["E ego 24.6 m/s", "F front 23.5 m/s", NO_VEHICLE]);
+        assert_eq!(names(26.0), ["E ego", "F front", NO_VEHICLE]);
+        // The last in the order of the ranks goes first.
+        assert_eq!(names(12.0), ["E ego", "F front"]);
+        assert_eq!(names(-1.0), Vec::<String>::new(), "a row that the clock and the collision fill");
     }
 }

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use closecall_controllers::EgoState;
+use closecall_controllers::{EgoState, Reason};
 use closecall_scenarios::outcome::{Moment, Phase, ReachedMoment};
 use closecall_sensors::Health;
 use closecall_sensors::faults::{SensorGroup, StatedFault};
@@ -30,9 +30,9 @@ const BEFORE: &str = "-";
 const NO_REAR: &str = "no vehicle behind";
 const BRAKES: &str = "on";
 const DRIVES: &str = "off";
-/// Number of letters in a bar as long as the time axis, in a window of 1280 px, and number of
-/// letters that its padding takes.
-const AXIS_LETTERS: f64 = 76.0;
+/// Number of letters in a bar as long as the time axis, in a window of 1280 px (454 px, 6.7 px a
+/// letter), and number of letters that its padding takes.
+const AXIS_LETTERS: f64 = 68.0;
 const PADDING_LETTERS: f64 = 1.5;
 
 /// A state of a band.
@@ -145,6 +145,41 @@ pub(in super::super) const fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
+/// Returns the text of a short bar of a reason. The first words of several reasons are alike.
+const fn short_reason(reason: Reason) -> &'static str {
+    match reason {
+        Reason::NoMis => "no MIS",
+        Reason::NotAutomated => "manual",
+        Reason::FrontSensorFailed | Reason::SurroundSensorsFailed | Reason::RearSensorsFailed => "not available",
+        Reason::NoFront => "none ahead",
+        Reason::FrontMarginLong => "long enough",
+        Reason::NoRear => "none behind",
+        Reason::RearUnconfirmed => "not confirmed",
+        Reason::RearUnclassified => "not classified",
+        Reason::RearFar => "too far",
+        Reason::RearNotApproaching => "too slow",
+        Reason::NoPassingLane => "no lane",
+        Reason::PassingLaneOccupied => "lane occupied",
+        Reason::PassingLaneUnknown => "lane unknown",
+        Reason::RearFollowed => "followed",
+        Reason::Engaged | Reason::EngagedGoalOutOfReach => "engaged",
+        Reason::RearCrosses => "crosses",
+        Reason::CriticalDistance => "critical",
+        Reason::RearChangedLane => "left early",
+        Reason::RearPassed => "past",
+        Reason::RearFellBack => "fell back",
+        Reason::RearFollows => "follows",
+        Reason::RearLost => "track lost",
+        Reason::FrontLost => "lead lost",
+        Reason::HoldExpired => "time over",
+        Reason::NoRoomToHold => "no room",
+        Reason::MarginReturned => "given back",
+        Reason::BrakingRequired => "AEB",
+        Reason::BrakingDone => "AEB done",
+        Reason::External => "own reason",
+    }
+}
+
 /// Letters of a word that says little alone, such as *no*.
 const SHORT_WORD: usize = 3;
 
@@ -219,9 +254,9 @@ impl Plots<'_> {
                 STATES.iter().find(|word| word.text == ego_state_name(state)).map_or(palette::QUIET, |word| word.colour)
             }
         };
+        let short = |frame: &Frame| frame.command.map_or("", |command| short_reason(command.reason));
         let frames = self.film.frames.iter().zip(&words);
-        let states: Vec<Word<'_>> =
-            frames.map(|(frame, text)| Word::new(text, first_word(text), colour(frame))).collect();
+        let states: Vec<Word<'_>> = frames.map(|(frame, text)| Word::new(text, short(frame), colour(frame))).collect();
         self.band("2_reason", &words, &states)
     }
 
@@ -333,11 +368,14 @@ impl Plots<'_> {
 
     /// Writes a band with one state per frame, and its end after the last frame. A bar shows as
     /// much of the state's name as fits.
+    ///
+    /// The viewer fits its time axis to the rows that it has loaded when it draws first, so each row
+    /// has an empty state at the end of the recording.
     fn band(&self, row: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
         let entity = format!("{ENTITY}/{row}/{}", row_name(self.film.arm_label()));
         let rows = changes(words);
         let end = self.film.end() + self.film.period;
-        let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).chain([end]).collect();
+        let mut times: Vec<Time> = rows.iter().map(|&row| self.times[row]).chain([end]).collect();
         let (mut shown, mut bars) = (Vec::new(), BTreeMap::new());
         for (&row, span) in rows.iter().zip(times.windows(2)) {
             let word = states.iter().find(|state| state.text == words[row]).copied();
@@ -348,6 +386,10 @@ impl Plots<'_> {
             shown.push(state);
         }
         shown.push(String::new());
+        if self.writer.end() > end {
+            times.push(self.writer.end());
+            shown.push(String::new());
+        }
         let configuration = StateConfiguration::new()
             .with_values(bars.keys().map(String::as_str))
             .with_labels(bars.values().map(|(label, _)| *label))

@@ -20,6 +20,8 @@ use closecall_scenarios::{RearDriver, ScenarioFile, reenact};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::trajectories::TrafficRecorder;
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
+use closecall_studies::attribution::attribute;
+use closecall_studies::case::Case;
 
 mod whole_image;
 
@@ -409,6 +411,36 @@ fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
 }
 
 #[test]
+fn each_collision_has_the_answer_of_an_explanation_by_whom_it_was_avoidable() {
+    let film = filmed("paper-figure", ControllerChoice::ACC, (None, Level::Events));
+    let case = Case {
+        file: library("paper-figure"),
+        sampling: Sampling { seed: 1, design: Design::Random, samples: 1 },
+        sample: 0,
+        arm: Arm { controller: ControllerChoice::ACC.factory(), sensors: None },
+        parameters: None,
+        reference: None,
+    };
+    let (_, attribution) = attribute(&case, &[]).unwrap();
+    let answer = attribution.unwrap().avoidable;
+    assert!(answer.careful_in_striking.is_some(), "a front struck a rear: {answer:?}");
+    assert_eq!((film.avoidable.len(), film.avoidable[0]), (film.collisions().len(), Some(answer)));
+    let words: Vec<String> = film.avoidable.iter().flatten().map(|avoidable| avoidable.words().to_owned()).collect();
+    let data = chunks(&[film], StoreKind::Recording);
+    let of = |number: usize| -> Vec<String> {
+        let path = format!("/__properties/arms/acc/collision_{number}");
+        let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == path);
+        rows.flat_map(|chunk| texts(chunk, "avoidable_by")).collect()
+    };
+    for (index, words) in words.iter().enumerate() {
+        assert_eq!(of(index + 1), [words.clone()]);
+    }
+    assert!(of(words.len() + 1).is_empty());
+    let passes = filmed("paper-figure", ControllerChoice::MIS, (None, Level::Events));
+    assert!(passes.avoidable.is_empty() && passes.collisions().is_empty());
+}
+
+#[test]
 fn each_of_two_collisions_is_readable_in_the_row_of_states() {
     let mut film = filmed("paper-figure", ControllerChoice::ACC, (None, Level::Events));
     let first = film.worst_collision().unwrap().clone();
@@ -605,6 +637,25 @@ fn the_verdict_names_the_vehicle_that_was_seen_and_the_vehicle_of_the_engagement
 }
 
 #[test]
+fn the_rows_of_states_of_a_pair_end_together() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
+    assert!(films[0].end() != films[1].end(), "the arms end at different times");
+    let timeline = TimelineName::from_static_str(TIME_TIMELINE);
+    let data = chunks(&films, StoreKind::Recording);
+    let ends: BTreeMap<String, i64> = data
+        .iter()
+        .filter(|chunk| chunk.entity_path().to_string().starts_with("/states/"))
+        .filter_map(|chunk| {
+            Some((chunk.entity_path().to_string(), *chunk.timelines().get(&timeline)?.times_raw().last()?))
+        })
+        .collect();
+    assert!(ends.len() > 4, "{ends:?}");
+    let end = (films.iter().map(Film::end).max().unwrap() + CONTROL_STEP).ns();
+    assert!(ends.values().all(|&row| row == end), "{end}: {ends:?}");
+}
+
+#[test]
 fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
     let film = filmed("faults/object-ghost", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
     let data = chunks(std::slice::from_ref(&film), StoreKind::Recording);
@@ -612,6 +663,14 @@ fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
     assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
     let verdict = summary::verdict(&[film]);
     assert!(verdict.contains("the MIS engaged for a vehicle that does not exist at 2."), "{verdict}");
+    for ghost in ["faults/surround-ghost", "faults/front-radar-ghost"] {
+        let film = filmed(ghost, ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+        let labels = names_from_above(&chunks(&[film], StoreKind::Recording));
+        assert!(labels.iter().any(|label| label == "does not exist"), "{ghost}: {} labels", labels.len());
+    }
+    let truck = filmed("traffic/trucks-alongside", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+    let beside = names_from_above(&chunks(&[truck], StoreKind::Recording));
+    assert!(!beside.iter().any(|label| label == "does not exist"), "a truck beside the ego exists");
     let healthy = chunks(&[default_film()], StoreKind::Recording);
     assert!(!healthy.iter().any(|chunk| texts(chunk, "Points2D:labels").iter().any(|label| label == "does not exist")));
 }
