@@ -142,8 +142,8 @@ pub(crate) struct Clustering {
     /// For each cell, the number of candidates that were kept, at most as many as a core point needs,
     /// and the row of the latest.
     cells: Vec<(u8, u32)>,
-    /// Cell of each candidate.
-    cell_of: Vec<u32>,
+    /// Cell of each candidate that was kept.
+    kept_cells: Vec<u32>,
     /// Row of each candidate in `rows`. An omitted candidate has the row of another candidate in
     /// the same cell.
     row_of: Vec<u32>,
@@ -171,7 +171,7 @@ impl Clustering {
             labels: Vec::with_capacity(candidates),
             count: 0,
             cells: vec![(0, 0); CELLS_ALONG * CELLS_ACROSS],
-            cell_of: Vec::with_capacity(candidates),
+            kept_cells: Vec::with_capacity(candidates),
             row_of: Vec::with_capacity(candidates),
             rows: Vec::with_capacity(candidates),
             model: ClusteringModel::default(),
@@ -274,12 +274,10 @@ impl Clustering {
     fn thin(&mut self, candidates: &[Candidate]) {
         self.rows.clear();
         self.row_of.clear();
-        self.cell_of.clear();
+        self.kept_cells.clear();
         for candidate in candidates {
             let [along, across] = to_stretched_plane(candidate);
             let cell = cell(along, across);
-            #[expect(clippy::cast_possible_truncation, reason = "a grid of 105,000 cells, a scan of 20,000 points")]
-            self.cell_of.push(cell as u32);
             let (count, row) = &mut self.cells[cell];
             if usize::from(*count) < self.model.core_points {
                 *count += 1;
@@ -287,10 +285,12 @@ impl Clustering {
                 let next = self.rows.len() as u32;
                 *row = next;
                 self.rows.push([f64::from(along), f64::from(across)]);
+                #[expect(clippy::cast_possible_truncation, reason = "a grid of 105,000 cells")]
+                self.kept_cells.push(cell as u32);
             }
             self.row_of.push(*row);
         }
-        for &cell in &self.cell_of {
+        for &cell in &self.kept_cells {
             self.cells[cell as usize] = (0, 0);
         }
     }
