@@ -123,8 +123,8 @@ impl Mis {
     }
 
     /// Returns true if the ego is not to brake for the lead vehicle yet: the rear vehicle in its lane
-    /// would reach it within the holding time at present speeds, the road has a passing lane, and
-    /// there is still room to brake later. Only the extended system defers braking.
+    /// would reach it within the holding time at present speeds, no vehicle is in its way in the
+    /// passing lane, and there is still room to brake later. Only the extended system defers braking.
     ///
     /// A rear vehicle this near can no longer stop behind a braking ego. It pulls out, and needs the
     /// distance that the ego does not lose meanwhile.
@@ -132,8 +132,9 @@ impl Mis {
         let settings = &self.settings;
         let speed_mps = input.odometry.speed_mps;
         let passes_soon = |rear: RearVehicle| {
+            let lane = passing_lane(input, &rear, settings.follower_headway_s);
             rear.gap_m < settings.hold_s * (rear.speed_mps - speed_mps)
-                && passing_lane(input, &rear, settings.follower_headway_s) != PassingLane::None
+                && !matches!(lane, PassingLane::None | PassingLane::Occupied)
         };
         settings.is_cautious
             && nearest_rear_vehicle(input).filter(|rear| rear.confirmed && rear.classified).is_some_and(passes_soon)

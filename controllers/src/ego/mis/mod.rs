@@ -111,8 +111,8 @@
 //!
 //! The extended system brakes by the bound until no more braking is needed for the goal, since the
 //! lead vehicle may brake before the rear vehicle arrives. It engages at the same rear gap. While a
-//! rear vehicle in its lane would reach it within `hold-s` at present speeds, it defers all braking
-//! for the lead vehicle, emergency braking included, if the 5.9 m/s² after 0.3 s still suffice for a
+//! rear vehicle in its lane would reach it within `hold-s` at present speeds, and its passing lane is
+//! not occupied, the system defers all braking for the lead vehicle, emergency braking included, if the 5.9 m/s² after 0.3 s still suffice for a
 //! lead vehicle that goes on braking as it does. That is the risk that it takes: a lead vehicle that
 //! brakes harder from then on.
 //!

@@ -157,9 +157,10 @@ fn the_extended_system_does_not_brake_in_front_of_a_rear_vehicle_that_is_about_t
     brakes(between(extended, 30.0, 20.0, |_| {}));
     // The rear vehicle arrives after 2.7 s.
     brakes(between(extended, 48.0, 40.0, |_| {}));
-    // It has left the lane of the ego, has no lane to pass in, or may be no vehicle.
+    // It has left the lane of the ego, has no lane or no free lane to pass in, or may be no vehicle.
     brakes(between(extended, 48.0, 20.0, |bench| bench.rear().lane = [1.0, 0.0, 0.0]));
     brakes(between(extended, 48.0, 20.0, |bench| bench.lane = Lane(1)));
+    brakes(between(extended, 48.0, 20.0, |bench| bench.tracks.push(track(3, -15.0, 45.0, 0))));
     brakes(between(extended, 48.0, 20.0, |bench| bench.rear().status = TrackStatus::Tentative));
     brakes(between(extended, 48.0, 20.0, |bench| bench.rear().class = ClassScores::UNKNOWN));
     brakes(between(MisSettings { hold_s: 0.0, ..extended }, 48.0, 20.0, |_| {}));
