@@ -8,13 +8,14 @@
 //! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
 //! Behind a braking lead vehicle the extended MIS brakes at once, by the constant braking that just
-//! suffices, instead of using up the margin first; only holding has precedence. The braking builds up
-//! as a human driver's does in an emergency. A slower build-up must brake harder in the end, in front
-//! of a rear vehicle that has come nearer.
+//! suffices, instead of using up the margin first; only holding has precedence. The braking builds
+//! up as a human driver's does in an emergency (12.65 m/s³, UN Regulation 157). A slower build-up
+//! must brake harder in the end, in front of a rear vehicle that has come nearer.
 //!
-//! While the rear vehicle would reach the ego within the holding time, the extended MIS defers all
-//! braking, as long as the braking that is assured still stops the ego behind the lead vehicle. Emergency
-//! braking waits too. The margin is there for this moment: the rear vehicle needs it to pull out.
+//! While the rear vehicle would reach the ego within the holding time and can pull out, the extended
+//! MIS defers all braking, as long as the assured braking still stops the ego behind the lead
+//! vehicle. Emergency braking waits too. The margin is there for this moment: the rear vehicle needs
+//! it to pull out.
 //!
 //! The result is the *comfort command*. Emergency braking overrides it if it requests more braking.
 //! The jerk limits hold for the comfort command alone, and each step starts from the comfort
