@@ -115,10 +115,10 @@ impl MisSettings {
     /// since the rear vehicle must follow it; 1 to 3.5 are plausible.
     pub const EXTENDED_MAX_DECELERATION_MPS2: f64 = 2.0;
 
-    /// Largest rate at which the braking of the extended system builds up (m/s³): an assumption, the
-    /// jerk that ISO 15622 allows an adaptive cruise control at low speeds; 2.5 (its limit at highway
-    /// speeds) to 5 are plausible. At most 2 m/s² are built up, so that the jerk averages no more than
-    /// 2 m/s³ over a second.
+    /// Largest rate at which the braking of the extended system builds up (m/s³): an assumption,
+    /// the jerk that ISO 15622 allows an adaptive cruise control at low speeds; 2.5 (its limit at
+    /// highway speeds) to 5 are plausible. At most 2 m/s² are built up, so that the jerk averages
+    /// no more than 2 m/s³ over a second.
     pub const EXTENDED_MAX_JERK_MPS3: f64 = 5.0;
 
     /// Smallest time headway of a vehicle behind the rear vehicle in the passing lane with which
@@ -149,8 +149,8 @@ impl MisSettings {
     /// The lead vehicle may brake at any time, also before the rear vehicle is at the critical gap.
     /// The gentlest braking that reaches the goal gains most of the margin in the last seconds.
     ///
-    /// Braking limit and build-up are the values that determine most how much margin the system gains
-    /// until the rear vehicle arrives. A system with larger values already keeps its own.
+    /// Braking limit and build-up are the values that determine most how much margin the system
+    /// gains until the rear vehicle arrives. A system with larger values already keeps its own.
     #[must_use]
     pub const fn extended(self) -> Self {
         Self {

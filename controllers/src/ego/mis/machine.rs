@@ -122,12 +122,13 @@ impl Mis {
         &self.settings
     }
 
-    /// Returns true if the ego is not to brake for the lead vehicle yet: the rear vehicle in its lane
-    /// would reach it within the holding time at present speeds, no vehicle is in its way in the
-    /// passing lane, and there is still room to brake later. Only the extended system defers braking.
+    /// Returns true if the ego is not to brake for the lead vehicle yet: the rear vehicle in its
+    /// lane would reach it within the holding time at present speeds, no vehicle is in its way in
+    /// the passing lane, and there is still room to brake later. Only the extended system defers
+    /// braking.
     ///
-    /// A rear vehicle this near can no longer stop behind a braking ego. It pulls out, and needs the
-    /// distance that the ego does not lose meanwhile.
+    /// A rear vehicle this near can no longer stop behind a braking ego. It pulls out, and needs
+    /// the distance that the ego does not lose meanwhile.
     pub(crate) fn defers_braking(&self, input: &EgoInput<'_>, lead: &Front) -> bool {
         let settings = &self.settings;
         let speed_mps = input.odometry.speed_mps;
