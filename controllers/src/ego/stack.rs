@@ -8,7 +8,14 @@
 //! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
 //! Behind a braking lead vehicle the extended MIS brakes at once, by the constant braking that just
-//! suffices, instead of using up the margin first; only holding has precedence.
+//! suffices, instead of using up the margin first; only holding has precedence. The braking builds
+//! up as a human driver's does in an emergency (12.65 m/s³, UN Regulation 157). A slower build-up
+//! must brake harder in the end, in front of a rear vehicle that has come nearer.
+//!
+//! While the rear vehicle would reach the ego within the holding time and can pull out, the extended
+//! MIS defers all braking, as long as the assured braking still stops the ego behind the lead
+//! vehicle. Emergency braking waits too. The margin is there for this moment: the rear vehicle needs
+//! it to pull out.
 //!
 //! The result is the *comfort command*. Emergency braking overrides it if it requests more braking.
 //! The jerk limits hold for the comfort command alone, and each step starts from the comfort
@@ -24,6 +31,7 @@ use closecall_traffic::Time;
 use super::mis::{BRAKE_RELEASE_JERK_MPS3, Mis, Request, Situation};
 use super::surroundings::{Front, LeadVehicleSelector};
 use super::{Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
+use crate::driver::DEFAULT_BRAKE_BUILD_UP_MPS3;
 
 /// Largest acceleration while the margin is returned (m/s²): an assumption, half of what the ACC
 /// may use; plausible are 0.5 to 1.5.
@@ -109,7 +117,8 @@ impl EgoStack {
         let highest = last_mps2 + BRAKE_RELEASE_JERK_MPS3 * step_s;
         let most_mps2 = match lead {
             Some(lead) if mis.settings().is_cautious && lead.acceleration_mps2 < -LEAD_BRAKES_MPS2 => {
-                (-lead.required_braking_mps2(speed_mps, STANDSTILL_GAP_M)).max(lowest)
+                let at_once = last_mps2 - DEFAULT_BRAKE_BUILD_UP_MPS3 * step_s;
+                (-lead.required_braking_mps2(speed_mps, STANDSTILL_GAP_M)).max(lowest.min(at_once))
             }
             _ => f64::INFINITY,
         };
@@ -132,6 +141,12 @@ impl EgoController for EgoStack {
         let speed_mps = input.odometry.speed_mps;
         let braking =
             self.settings.aeb.and_then(|aeb| aeb.braking_mps2(self.emergency_braking, speed_mps, lead.as_ref()));
+        let is_deferred = self.settings.automated
+            && self.mis.as_ref().zip(lead.as_ref()).is_some_and(|(mis, lead)| mis.defers_braking(input, lead));
+        let braking = braking.filter(|_| !is_deferred);
+        if is_deferred {
+            command.acceleration_mps2 = command.acceleration_mps2.max(0.0);
+        }
         if let Some(braking) = braking {
             command.acceleration_mps2 = command.acceleration_mps2.min(-braking);
             command.state = EgoState::EmergencyBraking;

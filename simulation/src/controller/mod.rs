@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `acc` | the scenario's ego stack without its margin increase system |
 //! | `mis` | the scenario's complete ego stack |
-//! | `mis-extended` | the same, with a margin increase system that engages earlier and may brake harder |
+//! | `mis-extended` | the same, with a margin increase system that gains its margin at once and may brake harder |
 //! | `acc-aeb`, `acc+aeb`, `cruise+aeb` | stacks whose functions are switched ([`functions`](Functions)) |
 //! | `CONTROLLER:KEY=VALUE` | a built-in controller with settings of its own ([`tuned`](Tuned)) |
 //! | `gap-SECONDS` | as `acc`, with another constant time gap |

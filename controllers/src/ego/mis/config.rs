@@ -110,15 +110,16 @@ impl MisSettings {
         max_deficit_mps: f64::INFINITY,
     };
 
-    /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors
-    /// to the rear confirm and classify a car (the data sheet of the simulated LiDAR states 200 m
-    /// on good targets); 120 to 200 are plausible.
-    const EXTENDED_ENGAGE_GAP_M: f64 = 150.0;
-
     /// Strongest braking of the extended system (m/s²): an assumption. ISO 15622 allows an adaptive
     /// cruise control 3.5 m/s² at highway speeds; the system uses little more than half of it,
     /// since the rear vehicle must follow it; 1 to 3.5 are plausible.
     pub const EXTENDED_MAX_DECELERATION_MPS2: f64 = 2.0;
+
+    /// Largest rate at which the braking of the extended system builds up (m/s³): an assumption,
+    /// the jerk that ISO 15622 allows an adaptive cruise control at low speeds; 2.5 (its limit at
+    /// highway speeds) to 5 are plausible. At most 2 m/s² are built up, so that the jerk averages
+    /// no more than 2 m/s³ over a second.
+    pub const EXTENDED_MAX_JERK_MPS3: f64 = 5.0;
 
     /// Smallest time headway of a vehicle behind the rear vehicle in the passing lane with which
     /// the extended system takes that lane for free (s): an assumption, the distance that automated
@@ -137,22 +138,24 @@ impl MisSettings {
     /// allows 10 m/s, to which the release of the brake adds about 1 m/s.
     const EXTENDED_MAX_DEFICIT_MPS: f64 = 8.0;
 
-    /// Returns the settings of the extended system: it engages earlier, gains the margin at once
-    /// instead of just in time, may brake harder, does not act if another vehicle closes the way of
-    /// the rear vehicle or follows it closely, and brakes for a braking lead vehicle at once. Every
-    /// other value stays as it is.
+    /// Returns the settings of the extended system: it gains the margin at once instead of just in
+    /// time, may brake harder and builds up the braking faster, does not act if another vehicle
+    /// closes the way of the rear vehicle or follows it closely, and brakes for a braking lead
+    /// vehicle at once. Every other value stays as it is.
+    ///
+    /// It engages at the same gap and closing speed. Requirement MIS-9 allows no slowing before: an
+    /// ego that slows down earlier gains its margin from vehicles that may never come near.
     ///
     /// The lead vehicle may brake at any time, also before the rear vehicle is at the critical gap.
     /// The gentlest braking that reaches the goal gains most of the margin in the last seconds.
     ///
-    /// Engagement distance and braking limit are the values that determine most how much margin the
-    /// system gains until the rear vehicle arrives. A system with larger values already keeps its
-    /// own.
+    /// Braking limit and build-up are the values that determine most how much margin the system
+    /// gains until the rear vehicle arrives. A system with larger values already keeps its own.
     #[must_use]
     pub const fn extended(self) -> Self {
         Self {
-            engage_gap_m: self.engage_gap_m.max(Self::EXTENDED_ENGAGE_GAP_M),
             max_deceleration_mps2: self.max_deceleration_mps2.max(Self::EXTENDED_MAX_DECELERATION_MPS2),
+            max_jerk_mps3: self.max_jerk_mps3.max(Self::EXTENDED_MAX_JERK_MPS3),
             thw_gain_s: self.thw_gain_s.max(Self::EXTENDED_THW_GAIN_S),
             follower_headway_s: self.follower_headway_s.max(Self::EXTENDED_FOLLOWER_HEADWAY_S),
             is_cautious: true,

@@ -3,7 +3,7 @@
 use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, Time};
 
-use super::room::has_room;
+use super::room::{can_defer, has_room};
 use super::target::Target;
 use super::{ArrivalPrediction, BrakingResponse, Encounter, Horizon, MisPlan, MisSettings};
 use crate::ego::surroundings::{Front, PassingLane, RearVehicle, is_followed, nearest_rear_vehicle, passing_lane};
@@ -120,6 +120,26 @@ impl Mis {
 
     pub(crate) fn settings(&self) -> &MisSettings {
         &self.settings
+    }
+
+    /// Returns true if the ego is not to brake for the lead vehicle yet: the rear vehicle in its
+    /// lane would reach it within the holding time at present speeds, no vehicle is in its way in
+    /// the passing lane, and there is still room to brake later. Only the extended system defers
+    /// braking.
+    ///
+    /// A rear vehicle this near can no longer stop behind a braking ego. It pulls out, and needs
+    /// the distance that the ego does not lose meanwhile.
+    pub(crate) fn defers_braking(&self, input: &EgoInput<'_>, lead: &Front) -> bool {
+        let settings = &self.settings;
+        let speed_mps = input.odometry.speed_mps;
+        let passes_soon = |rear: RearVehicle| {
+            let lane = passing_lane(input, &rear, settings.follower_headway_s);
+            rear.gap_m < settings.hold_s * (rear.speed_mps - speed_mps)
+                && !matches!(lane, PassingLane::None | PassingLane::Occupied)
+        };
+        settings.is_cautious
+            && nearest_rear_vehicle(input).filter(|rear| rear.confirmed && rear.classified).is_some_and(passes_soon)
+            && can_defer(speed_mps, lead)
     }
 
     /// Performs one control step.

@@ -81,7 +81,8 @@
 //! | releasing | ACC, limited | ≤ 0.8 m/s² | rises by 3 m/s³ |
 //!
 //! Braking by the ACC, up to 3.5 m/s², passes in all states but holding; emergency braking always
-//! passes. The jerk limits hold for the comfort command, beneath emergency braking.
+//! passes, unless the extended system defers it. The jerk limits hold for the comfort command,
+//! beneath emergency braking.
 //!
 //! *Holding* is the paper's critical time: for `hold-s` the ego uses up its margin instead of
 //! braking for the lead vehicle. It begins when the centre of the rear vehicle crosses the marking,
@@ -110,7 +111,11 @@
 //! rear vehicle keep their speeds; the plan is computed afresh at every step.
 //!
 //! The extended system brakes by the bound until no more braking is needed for the goal, since the
-//! lead vehicle may brake before the rear vehicle arrives.
+//! lead vehicle may brake before the rear vehicle arrives. It engages at the same rear gap. While a
+//! rear vehicle in its lane would reach it within `hold-s` at present speeds, and its passing lane
+//! is not occupied, the system defers all braking for the lead vehicle, emergency braking included,
+//! if the 5.9 m/s² after 0.3 s still suffice for a lead vehicle that goes on braking as it does.
+//! That is the risk that it takes: a lead vehicle that brakes harder from then on.
 //!
 //! With [`Horizon::Ttce`] a* is instead the braking that gains the headway within the time to
 //! closest encounter at present speeds, as in the paper's text. The ego's own braking makes the

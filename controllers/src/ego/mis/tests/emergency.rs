@@ -127,3 +127,41 @@ fn the_comfort_command_starts_at_zero_and_stays_within_the_jerk_limit_of_the_acc
         }
     }
 }
+
+/// Returns the command for a lead vehicle at 10 m/s and a rear vehicle at 45 m/s, the ego driving at
+/// 30 m/s. `change` changes the bench before.
+fn between(mis: MisSettings, front_gap_m: f64, rear_gap_m: f64, change: fn(&mut Bench)) -> EgoCommand {
+    let mut bench = Bench::with_settings(EgoSettings { mis: Some(mis), ..with_aeb() });
+    bench.lead().state[0] = front_gap_m + CAR_M;
+    bench.lead().state[2] = 10.0;
+    bench.rear().state[0] = -rear_gap_m - CAR_M;
+    bench.rear().state[2] = 45.0;
+    change(&mut bench);
+    bench.step()
+}
+
+#[test]
+fn the_extended_system_does_not_brake_in_front_of_a_rear_vehicle_that_is_about_to_pass() {
+    let extended = MisSettings::PAPER.extended();
+    // The rear vehicle arrives after 1.3 s. 4.3 m/s² suffice in front, and 5.4 m/s² after the delay.
+    let deferred = between(extended, 48.0, 20.0, |_| {});
+    assert_ne!(deferred.state, EgoState::EmergencyBraking);
+    assert!(deferred.acceleration_mps2 >= 0.0, "{deferred:?}");
+    let brakes = |command: EgoCommand| {
+        assert_eq!(command.state, EgoState::EmergencyBraking, "{command:?}");
+        assert!(command.acceleration_mps2 < -4.0, "{command:?}");
+    };
+    // The paper's system leaves emergency braking alone.
+    brakes(between(MisSettings::PAPER, 48.0, 20.0, |_| {}));
+    // After the delay, 10 m/s² would be needed in front: more than is assured.
+    brakes(between(extended, 30.0, 20.0, |_| {}));
+    // The rear vehicle arrives after 2.7 s.
+    brakes(between(extended, 48.0, 40.0, |_| {}));
+    // It has left the lane of the ego, has no lane or no free lane to pass in, or may be no vehicle.
+    brakes(between(extended, 48.0, 20.0, |bench| bench.rear().lane = [1.0, 0.0, 0.0]));
+    brakes(between(extended, 48.0, 20.0, |bench| bench.lane = Lane(1)));
+    brakes(between(extended, 48.0, 20.0, |bench| bench.tracks.push(track(3, -15.0, 45.0, 0))));
+    brakes(between(extended, 48.0, 20.0, |bench| bench.rear().status = TrackStatus::Tentative));
+    brakes(between(extended, 48.0, 20.0, |bench| bench.rear().class = ClassScores::UNKNOWN));
+    brakes(between(MisSettings { hold_s: 0.0, ..extended }, 48.0, 20.0, |_| {}));
+}

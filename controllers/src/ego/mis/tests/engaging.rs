@@ -154,6 +154,22 @@ fn the_nearer_of_two_rear_vehicles_is_the_target() {
 }
 
 #[test]
+fn the_extended_system_does_not_engage_for_a_vehicle_farther_away_than_100_m() {
+    // Requirement MIS-9: the ego does not slow down before a vehicle behind is within 100 m.
+    for (gap_m, engages) in [(150.0, false), (101.0, false), (99.0, true)] {
+        let mut bench = Bench::with_mis(MisSettings::PAPER.extended());
+        bench.rear().state[0] = -gap_m - CAR_M;
+        if engages {
+            assert_eq!(bench.step().state, EgoState::Increasing, "{gap_m}");
+        } else {
+            bench.assert_not_engaged(Reason::RearFar);
+            let braking_mps2 = -bench.step_for(2.0).acceleration_mps2;
+            assert!(braking_mps2 <= 0.0, "{gap_m}: {braking_mps2}");
+        }
+    }
+}
+
+#[test]
 fn the_extended_system_gains_the_margin_at_once_and_the_paper_s_just_in_time() {
     // The rear vehicle is 3 m/s faster: its arrival takes long, and gentle braking reaches the goal.
     let braking_mps2 = |mis: MisSettings| {
