@@ -5,6 +5,9 @@
 //! numbers. Agreement beyond chance is Cohen's κ (J. Cohen, *A coefficient of agreement for nominal
 //! scales*, 1960). Each sample on which the modes differ has a reason: the first difference of the
 //! two runs that is large enough to matter.
+//!
+//! A second measure is the engagement of the system: the modes may agree on every collision, and
+//! still engage at different distances of the rear vehicle.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::ScenarioFile;
@@ -12,8 +15,8 @@ use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::{Arm, NoObserver, RunKey, SampleError, simulate};
-use closecall_traffic::VehicleClass;
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, SampleError, StepView, simulate};
+use closecall_traffic::{Appearance, CONTROL_STEP, Time, VehicleClass};
 use rayon::prelude::*;
 
 use crate::perception::study::StudyError;
@@ -31,6 +34,8 @@ pub struct Verdict {
     pub has_collided: bool,
     /// Time at which the system engaged (s), if it did.
     pub engaged_at_s: Option<f64>,
+    /// Gap behind the ego at that time (m), if it was observed and a vehicle was in the ego's lane.
+    pub engaged_at_m: Option<f64>,
     /// Time at which it released (s), if it did.
     pub released_at_s: Option<f64>,
     /// Smallest gap behind the ego (m), if a vehicle was there.
@@ -42,8 +47,8 @@ pub struct Verdict {
 pub struct Pair {
     /// The sample.
     pub sample: u64,
-    /// Class of the rear vehicle, and the reflectivity of its paint; `None` without one.
-    pub rear: Option<(VehicleClass, f64)>,
+    /// Class and appearance of the rear vehicle; `None` without one.
+    pub rear: Option<(VehicleClass, Appearance)>,
     /// With object-level sensors.
     pub object: Verdict,
     /// With the full chain.
@@ -57,16 +62,45 @@ pub struct Agreement {
     pub pairs: Vec<Pair>,
 }
 
+/// The gaps behind the ego in a run.
+#[derive(Debug, Default)]
+struct RearGaps {
+    /// Time (s) and gap (m) of each control step with a vehicle behind in the ego's lane.
+    steps: Vec<(f64, f64)>,
+}
+
+impl RearGaps {
+    /// Returns the gap at a time (m), if a vehicle is behind.
+    fn at_m(&self, time_s: f64) -> Option<f64> {
+        let half_step_s = 0.5 * CONTROL_STEP.s();
+        self.steps.iter().find(|(at_s, _)| (at_s - time_s).abs() < half_step_s).map(|(_, gap_m)| *gap_m)
+    }
+}
+
+impl Observer for RearGaps {
+    fn step(&mut self, view: &StepView<'_>) {
+        self.steps.extend(view.margins.gap_rear_m.ok().map(|gap_m| (view.time.s(), gap_m)));
+    }
+
+    fn event(&mut self, _: Time, _: &RunEvent) {}
+}
+
 impl Verdict {
-    /// Returns the verdict of a run.
+    /// Returns the verdict of a run, without the gap at the engagement.
     pub fn of(outcome: &Outcome) -> Self {
         let mis = outcome.mis.as_ref().ok();
         Self {
             has_collided: outcome.ego_collided(),
             engaged_at_s: mis.and_then(|mis| mis.engaged_at_s.ok()),
+            engaged_at_m: None,
             released_at_s: mis.and_then(|mis| mis.released_at_s.ok()),
             min_gap_rear_m: outcome.margins.min_gap_rear_m.ok(),
         }
+    }
+
+    /// Returns the verdict of a run with these gaps behind the ego.
+    fn with_gaps(self, gaps: &RearGaps) -> Self {
+        Self { engaged_at_m: self.engaged_at_s.and_then(|time_s| gaps.at_m(time_s)), ..self }
     }
 }
 
@@ -74,6 +108,12 @@ impl Pair {
     /// Returns whether the modes differ on the collision.
     pub fn differs(&self) -> bool {
         self.object.has_collided != self.full.has_collided
+    }
+
+    /// Returns by how much farther behind the rear vehicle is at the engagement with object-level
+    /// sensors than with the full chain (m), if both engage for a vehicle in the ego's lane.
+    pub fn engagement_difference_m(&self) -> Option<f64> {
+        self.object.engaged_at_m.zip(self.full.engaged_at_m).map(|(object_m, full_m)| object_m - full_m)
     }
 
     /// Returns the first difference of the two runs that is large enough to matter.
@@ -121,12 +161,15 @@ impl Agreement {
             let key = RunKey { seed, sample };
             let in_mode = |mode| {
                 let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(mode) };
-                let outcome = simulate(&scenario, key, &arm, &mut NoObserver);
-                outcome.map(|outcome| Verdict::of(&outcome)).map_err(|error: SampleError| failed(&error))
+                let mut gaps = RearGaps::default();
+                let outcome = simulate(&scenario, key, &arm, &mut gaps);
+                outcome
+                    .map(|outcome| Verdict::of(&outcome).with_gaps(&gaps))
+                    .map_err(|error: SampleError| failed(&error))
             };
             let rear = scenario.actors.iter().position(|actor| actor.id.as_str() == REAR).map(|index| {
                 let vehicle = scenario.vehicle(index, key);
-                (vehicle.class, vehicle.appearance.paint_reflectivity)
+                (vehicle.class, vehicle.appearance)
             });
             Ok(Pair { sample, rear, object: in_mode(SensorMode::Object)?, full: in_mode(SensorMode::Full)? })
         };
@@ -139,6 +182,20 @@ impl Agreement {
             self.pairs.iter().filter(|pair| condition(pair)).count() as f64 / self.pairs.len() as f64
         };
         [rate(|pair| pair.object.has_collided), rate(|pair| pair.full.has_collided)]
+    }
+
+    /// Returns by how much farther behind the rear vehicle is at the engagement with object-level
+    /// sensors than with the full chain (m), in rising order: one number for each sample in which
+    /// both engage for a vehicle in the ego's lane.
+    pub fn engagement_differences_m(&self) -> Vec<f64> {
+        let mut differences_m: Vec<f64> = self.pairs.iter().filter_map(Pair::engagement_difference_m).collect();
+        differences_m.sort_unstable_by(f64::total_cmp);
+        differences_m
+    }
+
+    /// Returns the number of samples in which the system engages in one mode alone.
+    pub fn engaged_in_one_mode(&self) -> usize {
+        self.pairs.iter().filter(|pair| pair.object.engaged_at_s.is_some() != pair.full.engaged_at_s.is_some()).count()
     }
 
     /// Returns Cohen's κ; `None` if no run or every run collides, so that chance alone explains the
@@ -159,6 +216,7 @@ mod tests {
         let verdict = |has_collided| Verdict {
             has_collided,
             engaged_at_s: Some(3.0),
+            engaged_at_m: Some(86.0),
             released_at_s: Some(9.0),
             min_gap_rear_m: Some(0.4),
         };
@@ -174,6 +232,23 @@ mod tests {
         assert!((agreement.kappa().unwrap() - 0.4).abs() < 1e-12);
         assert_eq!(agreement.rates(), [0.5, 0.6]);
         assert_eq!(Agreement { pairs: vec![pair(false, false)] }.kappa(), None);
+    }
+
+    #[test]
+    fn an_engagement_in_one_mode_alone_has_no_distance() {
+        let mut farther = pair(false, false);
+        farther.object.engaged_at_m = Some(97.5);
+        let mut alone = pair(false, false);
+        (alone.full.engaged_at_s, alone.full.engaged_at_m) = (None, None);
+        let agreement = Agreement { pairs: vec![farther, alone, pair(false, false)] };
+        assert_eq!(agreement.engagement_differences_m(), [0.0, 11.5]);
+        assert_eq!(agreement.engaged_in_one_mode(), 1);
+    }
+
+    #[test]
+    fn the_gap_at_the_engagement_is_the_gap_of_the_same_step() {
+        let gaps = RearGaps { steps: vec![(2.96, 88.0), (3.0, 87.5), (3.04, 87.0)] };
+        assert_eq!([2.99, 3.0, 4.0].map(|time_s| gaps.at_m(time_s)), [Some(87.5), Some(87.5), None]);
     }
 
     #[test]
