@@ -19,13 +19,6 @@ const EGO_S_M: f64 = 1_000.0;
 pub const GAPS_M: [f64; 2] = [150.0, 5.0];
 /// Closing speeds (m/s): 10 to 50 km/h, as in the scenarios of the library.
 const CLOSING_MPS: [f64; 2] = [2.8, 13.9];
-/// Length of an interruption of a track that does not count (m): the difference of engagement
-/// distances up to which two modes engage alike.
-const SHORT_INTERRUPTION_M: f64 = 5.0;
-/// Share of the gap at which the state of a track begins, to which an approach is followed in order
-/// to see whether the state lasts (-). The interruptions of dark vans and
-/// SUVs end at 0.55 of it or more.
-const LAST_SHARE: f64 = 0.5;
 /// Gap of the car in between (m).
 const SCREEN_GAP_M: f64 = 25.0;
 /// Gap at which a vehicle appears for the time to confirm (m), and the longest time that is waited
@@ -243,55 +236,33 @@ fn follow(
     Ok(())
 }
 
-/// The gaps from which on the track of a vehicle lasts in a state (m). If it never does, the gap at
-/// the end of the approach.
+/// The gaps at which the track of a vehicle reaches a state for the first time (m). If it never
+/// does, the gap at the end of the approach.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Onsets {
-    /// The track is confirmed, and exists at least as likely as not.
+pub(crate) struct Firsts {
+    /// The track is confirmed.
     pub(crate) confirmed_m: f64,
-    /// Such a track is classified as a vehicle: the state that a function waits for.
+    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle:
+    /// the state that a function waits for.
     pub(crate) classified_m: f64,
 }
 
-/// The gap from which on a state lasts.
-///
-/// Some vehicles are seen far away, lost again between two layers of the LiDAR, and seen anew. A
-/// function that engages at 100 m waits for the second time. An interruption that is shorter than
-/// [`SHORT_INTERRUPTION_M`] does not count.
-#[derive(Clone, Copy, Debug, Default)]
-struct Onset {
-    since_m: Option<f64>,
-    last_m: f64,
-}
-
-impl Onset {
-    fn see(&mut self, gap_m: f64, holds: bool) {
-        if holds {
-            self.since_m.get_or_insert(gap_m);
-            self.last_m = gap_m;
-        } else if self.last_m - gap_m > SHORT_INTERRUPTION_M {
-            self.since_m = None;
-        }
-    }
-
-    fn m(self) -> f64 {
-        self.since_m.unwrap_or(GAPS_M[1])
-    }
-}
-
-/// Returns from which gaps on the track of the vehicle is confirmed and classified.
+/// Returns when the track of the vehicle is confirmed and classified.
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
-pub(crate) fn onsets(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Onsets, SensorError> {
-    let [mut confirmed, mut classified] = [Onset::default(); 2];
+pub(crate) fn firsts(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Firsts, SensorError> {
+    let mut firsts = Firsts { confirmed_m: GAPS_M[1], classified_m: GAPS_M[1] };
     follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
-        let likely = track.filter(|track| track.existence >= 0.5);
-        confirmed.see(gap_m, likely.is_some());
-        classified.see(gap_m, likely.is_some_and(|track| track.class.is_vehicle()));
-        classified.since_m.is_none_or(|since_m| gap_m > LAST_SHARE * since_m)
+        let Some(track) = track else { return true };
+        firsts.confirmed_m = firsts.confirmed_m.max(gap_m);
+        let is_classified = track.existence >= 0.5 && track.class.is_vehicle();
+        if is_classified {
+            firsts.classified_m = gap_m;
+        }
+        !is_classified
     })?;
-    Ok(Onsets { confirmed_m: confirmed.m(), classified_m: classified.m() })
+    Ok(firsts)
 }
 
 /// Returns the scores of the true class between two gaps (m).

@@ -1,23 +1,19 @@
 //! The fit of the rear object-level sensor to the full chain.
 //!
 //! ```text
-//!  scenario ─▶ full chain ─┬▶ distances from which on tracks are confirmed, and classified as a vehicle,
+//!  scenario ─▶ full chain ─┬▶ distances of the first confirmed track and of the first one that is classified as a vehicle,
 //!                          │  over class, paint, plate, shape, extinction ─▶ ranges
 //!                          ├▶ errors and losses of the tracks over class, paint, extinction ─▶ those of the measurements
 //!                          └▶ scores of the true class ─▶ confidence
 //! ```
 //!
 //! Only perception is fitted: no controller runs, and no collision counts. A range is the mean
-//! distance from which on the track stays confirmed, plus the distance that the object-level sensor
-//! itself needs to confirm a vehicle. A class range is the mean distance from which on such a track
-//! is classified as a vehicle, plus the distance that the latency costs. It is a distance and no
+//! distance of the first confirmed track, plus the distance that the object-level sensor itself
+//! needs to confirm a vehicle. A class range is the mean distance at which a confirmed track is
+//! first classified as a vehicle, plus the distance that the latency costs. It is a distance and no
 //! time, because the full chain recognises a vehicle in fog at nearly the same distance at all
-//! closing speeds.
-//!
-//! All vehicles have the usual height of their body shape, as those of a fleet have: between the
-//! layers of the LiDAR, five centimetres of height move the range by 10 m.
-//!
-//! The errors of the measurements are fitted until the tracks have the errors of the full chain.
+//! closing speeds. The errors of the measurements are fitted until the tracks have the errors of
+//! the full chain.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +22,7 @@ use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, Senso
 use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass, maths};
 use rayon::prelude::*;
 
-use crate::perception::approach::{Address, Onsets, onsets, scores};
+use crate::perception::approach::{Address, Firsts, firsts, scores};
 use crate::perception::cases::Case;
 use crate::perception::study::StudyError;
 
@@ -37,15 +33,13 @@ mod tests;
 pub use errors::at_bounds;
 
 /// Reflectivities of the paint of the grid (-).
-const PAINTS: [f64; 8] = [0.05, 0.1, 0.2, 0.28, 0.35, 0.42, 0.5, 0.8];
+const PAINTS: [f64; 6] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.8];
 /// Visibilities of the grid (m), first the visibility of a clear day.
 const VISIBILITIES_M: [f64; 9] = [10_000.0, 1_000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0];
 /// Extinction multiplied by visibility: Koschmieder's contrast threshold of 2 %.
 const KOSCHMIEDER: f64 = 3.912;
-/// Reflectivities (-) and visibilities (m) in which body shapes are compared. Each paint of the grid
-/// has ratios of its own, because it depends on the shape from which paint on a car is seen beyond
-/// the range of its plate. The visibilities are a coarser grid.
-const SHAPE_PAINTS: [f64; 8] = PAINTS;
+/// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid.
+const SHAPE_PAINTS: [f64; 2] = [0.1, 0.4];
 const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
 /// Gaps between which the class scores of tracks are taken (m).
 const GAPS_M: [f64; 2] = [20.0, 80.0];
@@ -137,9 +131,9 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// Returns the mean distances at which tracks are confirmed and classified (m).
-fn means_m(onsets: &[Onsets]) -> [f64; 2] {
-    let mean_m = |distance_m: fn(&Onsets) -> f64| mean(&onsets.iter().map(distance_m).collect::<Vec<_>>());
-    [mean_m(|onsets| onsets.confirmed_m), mean_m(|onsets| onsets.classified_m)]
+fn means_m(firsts: &[Firsts]) -> [f64; 2] {
+    let mean_m = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
+    [mean_m(|firsts| firsts.confirmed_m), mean_m(|firsts| firsts.classified_m)]
 }
 
 impl<'a> Fitter<'a> {
@@ -155,17 +149,16 @@ impl<'a> Fitter<'a> {
 impl Fitter<'_> {
     fn case(class: VehicleClass, paint: f64, plate: Plate, visibility_m: f64) -> Case {
         let environment = Environment { visibility_m, ..Environment::CLEAR_DAY };
-        let shape = Some(BodyShape::of_class(class)[0]);
-        Case { class, paint, plate, shape, environment, ..Case::usual() }
+        Case { class, paint, plate, environment, ..Case::usual() }
     }
 
     /// Returns when the tracks are confirmed and classified in all approaches of a case.
-    fn onsets(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Onsets>, StudyError> {
-        let onsets = |run| {
-            onsets(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
+    fn firsts(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Firsts>, StudyError> {
+        let firsts = |run| {
+            firsts(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
-        (0..self.plan.approaches).into_par_iter().map(onsets).collect()
+        (0..self.plan.approaches).into_par_iter().map(firsts).collect()
     }
 
     /// Returns the distances that the object-level sensor with these errors needs to confirm a
@@ -174,7 +167,7 @@ impl Fitter<'_> {
         let file = with_settings(self.plan.file, &[format!("sensors.rear-object.range-m={TEST_RANGE_M:?}")])?;
         let sensors = file.concrete(&file.space().nominal())?.sensors.with_mode(SensorMode::Object);
         let sensors = sensors.without_range_fit(TEST_CLASS_RANGE_M).with_rear_errors(*errors);
-        let [confirmed_m, classified_m] = means_m(&self.onsets(&Case::usual(), &sensors)?);
+        let [confirmed_m, classified_m] = means_m(&self.firsts(&Case::usual(), &sensors)?);
         Ok([TEST_RANGE_M - confirmed_m, TEST_CLASS_RANGE_M - classified_m])
     }
 
@@ -194,19 +187,19 @@ impl Fitter<'_> {
             for paint in PAINTS {
                 let (mut row_m, mut class_row_m) = (Vec::new(), Vec::new());
                 for visibility_m in VISIBILITIES_M {
-                    let onsets = self.onsets(&Self::case(class, paint, plate, visibility_m), &self.full)?;
-                    let [centre_m, classified_m] = means_m(&onsets);
+                    let firsts = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
+                    let [centre_m, classified_m] = means_m(&firsts);
                     if class == VehicleClass::Car {
-                        squares += onsets
+                        squares += firsts
                             .iter()
                             .map(|approach| maths::ln(approach.confirmed_m / centre_m).powi(2))
                             .sum::<f64>();
-                        count += onsets.len() as f64 - 1.0;
+                        count += firsts.len() as f64 - 1.0;
                     }
                     let range_m = rounded(centre_m + delay_m, 10.0);
                     // A class that the full chain knows at the confirmation of the track limits
                     // nothing.
-                    let is_known_at_once = onsets.iter().all(|approach| approach.classified_m == approach.confirmed_m);
+                    let is_known_at_once = firsts.iter().all(|approach| approach.classified_m == approach.confirmed_m);
                     let class_range_m = rounded(classified_m + class_delay_m, 10.0).min(range_m);
                     row_m.push(range_m);
                     class_row_m.push(if is_known_at_once { range_m } else { class_range_m });
@@ -227,7 +220,7 @@ impl Fitter<'_> {
             let means_m = |shape: BodyShape| {
                 let means_at = |paint: f64, visibility_m: f64| {
                     let case = Case { shape: Some(shape), ..Self::case(class, paint, Plate::Clean, visibility_m) };
-                    self.onsets(&case, &self.full).map(|onsets| means_m(&onsets))
+                    self.firsts(&case, &self.full).map(|firsts| means_m(&firsts))
                 };
                 let row =
                     |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| means_at(paint, *visibility_m)).collect();

@@ -99,19 +99,3 @@ fn a_forced_change_of_the_id_and_a_forced_false_track_are_counted() {
     let background = ClassScores([0.0, 0.0, 0.0, 1.0]);
     assert_eq!(with_class(background).false_tracks, 0);
 }
-
-#[test]
-fn a_state_begins_after_its_last_long_interruption() {
-    let onset_m = |holds: fn(f64) -> bool| {
-        let mut onset = Onset::default();
-        (0..500).map(|step| 139.0 - 0.2 * f64::from(step)).for_each(|gap_m| onset.see(gap_m, holds(gap_m)));
-        onset.m()
-    };
-    assert_eq!(onset_m(|_| true), 139.0);
-    assert_eq!(onset_m(|_| false), GAPS_M[1]);
-    // Seen far away, lost from 110 to 80 m, and seen anew.
-    let anew_m = onset_m(|gap_m| !(80.0..110.0).contains(&gap_m));
-    assert!((anew_m - 80.0).abs() < 0.3, "{anew_m}");
-    assert_eq!(onset_m(|gap_m| !(80.0..84.0).contains(&gap_m)), 139.0, "a short interruption");
-    assert_eq!(onset_m(|gap_m| gap_m > 60.0), GAPS_M[1], "it does not last");
-}
