@@ -41,10 +41,10 @@ const TOO_FAR: f64 = 1.6;
 /// of US-101, no vehicle is above 1.03. An assumption with a plausible range of 0.05 to 0.5.
 const TOO_LOW_VEHICLES: f64 = 0.2;
 
-/// Difference between the distance by positions and the distance by recorded speeds, of all moving vehicles
-/// together, above which one of them is in doubt, as a share of the latter (-). Frame rates of 25 Hz and 30 Hz
-/// differ by 0.2. The windows of US-101 have 0.001, and 0.03 with two vehicles. An assumption with a
-/// plausible range of 0.05 to 0.15.
+/// Difference between the distance by positions and the distance by recorded speeds, of all moving
+/// vehicles together, above which a result is in doubt, as a share of the distance by speeds (-). Frame
+/// rates of 25 Hz and 30 Hz differ by 0.2. The windows of US-101 have 0.001, and 0.03 with two vehicles.
+/// An assumption with a plausible range of 0.05 to 0.15.
 const MOST_DISAGREEMENT: f64 = 0.1;
 
 /// One step of a vehicle between two frames.

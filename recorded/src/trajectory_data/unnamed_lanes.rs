@@ -33,8 +33,8 @@ use super::road_axis::{Departures, LateralPositions};
 /// pass several. An assumption with a plausible range of 10 to 40 m.
 const SECTION_M: f64 = 20.0;
 
-/// Least number of vehicles that show a movement. Within 20 m, drivers move by 0.1 m, and the median of five
-/// is accurate to 0.06 m. Two of the five may change lanes.
+/// Least number of vehicles that show a movement: if drivers move by 0.1 m within 20 m, the median of five is
+/// accurate to 0.06 m. Two of the five may change lanes. An assumption with a plausible range of 5 to 10.
 const LEAST_MOVING: usize = 5;
 
 /// Least share of the positions that a lane holds (-), as in `inferred_road`.
