@@ -14,7 +14,7 @@ use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::builder::PIECE_STRIDE;
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::continuity::LONGEST_BRIDGE;
+use super::continuity::{JUMP_ALONG_MPS, LONGEST_BRIDGE};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
@@ -240,6 +240,24 @@ impl Collected {
     }
 }
 
+/// Returns the speed at row `k` of `rows` of a vehicle (m/s), by the step before and the step after it.
+/// `step` returns the distance (m) and the time (s) between two rows. Where one of both steps is one that no
+/// vehicle makes, because a number was given to another vehicle, the other one gives the speed.
+pub(super) fn derived_speed_mps(k: usize, rows: usize, step: impl Fn(usize, usize) -> (f64, f64)) -> f64 {
+    let speed_mps = |from: usize, to: usize| {
+        let (along_m, span_s) = step(from, to);
+        if span_s > 0.0 { along_m / span_s } else { 0.0 }
+    };
+    let (before, after) = (k.saturating_sub(1), (k + 1).min(rows.saturating_sub(1)));
+    if before < k && k < after {
+        let (arriving_mps, leaving_mps) = (speed_mps(before, k), speed_mps(k, after));
+        if (leaving_mps - arriving_mps).abs() > JUMP_ALONG_MPS {
+            return if arriving_mps.abs() < leaving_mps.abs() { arriving_mps } else { leaving_mps };
+        }
+    }
+    speed_mps(before, after)
+}
+
 /// Returns the number of each vehicle. If all names are numbers, it is the name. Otherwise vehicles are
 /// numbered in the order in which they appear.
 fn numbers(names: &[String], notes: &mut Vec<String>) -> Vec<u64> {
@@ -437,5 +455,25 @@ impl RowSource for CollectedSource {
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         self.items.pop_front().transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_that_no_vehicle_makes_gives_no_speed() {
+        // 20 m/s, and a jump of 200 m between rows 2 and 3.
+        let s_m = |k: usize| 2.0 * k as f64 + if k > 2 { 200.0 } else { 0.0 };
+        let step = |from: usize, to: usize| (s_m(to) - s_m(from), 0.1 * (to - from) as f64);
+        for k in 0..6 {
+            assert!((derived_speed_mps(k, 6, step) - 20.0).abs() < 1e-9, "row {k}");
+        }
+        // Braking is no jump: the speed is the mean of both steps.
+        let at_m = [0.0, 1.6, 3.0];
+        let braking = |from: usize, to: usize| (at_m[to] - at_m[from], 0.1 * (to - from) as f64);
+        assert!((derived_speed_mps(1, 3, braking) - 15.0).abs() < 1e-9);
+        assert_eq!(derived_speed_mps(0, 1, |_, _| (0.0, 0.0)).to_bits(), 0.0_f64.to_bits());
     }
 }

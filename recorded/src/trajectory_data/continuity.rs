@@ -38,7 +38,7 @@ const LEAST_CUT: u64 = 3;
 
 /// Excess over the recorded speed that makes a step along the road a jump (m/s). No vehicle is so
 /// fast within one step; errors of NGSIM's positions stay below it.
-const JUMP_ALONG_MPS: f64 = 30.0;
+pub(super) const JUMP_ALONG_MPS: f64 = 30.0;
 /// Smallest jump along the road (m): less than the length of a car, so that two cars in one lane
 /// are further apart.
 const JUMP_ALONG_M: f64 = 3.5;

@@ -22,6 +22,7 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 use closecall_traffic::{Lane, maths};
 
@@ -29,7 +30,7 @@ use super::markings::{CARRIAGEWAY_GAP_M, LaneMarkings};
 use super::source::Row;
 
 /// Lane widths that are tried (m), and their step.
-const WIDTHS_M: std::ops::RangeInclusive<f64> = 3.0..=4.0;
+pub(super) const WIDTHS_M: RangeInclusive<f64> = 3.0..=4.0;
 const WIDTH_STEP_M: f64 = 0.02;
 
 /// Bandwidth of the density (m): the spread of vehicles within their lanes. An assumption with a
@@ -42,9 +43,9 @@ const MODE_SHARE: f64 = 0.4;
 
 /// Least resultant of the lane width (-). Positions of 15 vehicles that are spread evenly reach 0.4
 /// at some width; the windows of US-101 have 0.6 to 0.75.
-const LEAST_RESULTANT: f64 = 0.5;
+pub(super) const LEAST_RESULTANT: f64 = 0.5;
 /// Least number of vehicles of a carriageway.
-const LEAST_VEHICLES: usize = 15;
+pub(super) const LEAST_VEHICLES: usize = 15;
 /// Least share of the rows of its carriageway that a lane holds (-).
 const LEAST_SHARE: f64 = 0.01;
 /// Largest distance between the modes and the middles of lanes that begin at d = 0 (m): a third of a
@@ -123,7 +124,7 @@ impl Carriageway {
         }
         // To the right, as lanes are counted.
         let right_m: Vec<f64> = positions.iter().map(|(d_m, _)| -d_m).collect();
-        let (resultant, width_m, phase_m) = period(&right_m);
+        let Period { resultant, width_m, phase_m } = Period::of(&right_m, WIDTHS_M);
         if !(resultant >= LEAST_RESULTANT) {
             return Err(format!(
                 "no lane width stands out: the resultant is {resultant:.2}, but {LEAST_RESULTANT} is needed"
@@ -145,25 +146,38 @@ impl Carriageway {
     }
 }
 
-/// Returns the largest resultant of all lane widths, the width, and the middle of a lane.
-fn period(right_m: &[f64]) -> (f64, f64, f64) {
-    let steps = ((WIDTHS_M.end() - WIDTHS_M.start()) / WIDTH_STEP_M).round();
-    let mut best = (0.0, *WIDTHS_M.start(), 0.0);
-    let mut width_m = *WIDTHS_M.start();
-    for _ in 0..=steps as u32 {
-        let (mut cosine, mut sine) = (0.0, 0.0);
-        for position_m in right_m {
-            let angle = 2.0 * PI * position_m / width_m;
-            cosine += maths::cos(angle);
-            sine += maths::sin(angle);
+/// The period of lateral positions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Period {
+    /// Resultant at the width (-): 1 if all vehicles drive on lines that are a width apart.
+    pub(super) resultant: f64,
+    pub(super) width_m: f64,
+    /// The middle of a lane, from 0 to the width (m).
+    pub(super) phase_m: f64,
+}
+
+impl Period {
+    /// Returns the period with the largest resultant of all widths in `widths_m`.
+    pub(super) fn of(positions_m: &[f64], widths_m: RangeInclusive<f64>) -> Self {
+        let steps = ((widths_m.end() - widths_m.start()) / WIDTH_STEP_M).round();
+        let mut width_m = *widths_m.start();
+        let mut best = Self { resultant: 0.0, width_m, phase_m: 0.0 };
+        for _ in 0..=steps as u32 {
+            let (mut cosine, mut sine) = (0.0, 0.0);
+            for position_m in positions_m {
+                let angle = 2.0 * PI * position_m / width_m;
+                cosine += maths::cos(angle);
+                sine += maths::sin(angle);
+            }
+            let resultant = maths::hypot(cosine, sine) / positions_m.len() as f64;
+            if resultant > best.resultant {
+                let phase_m = (maths::atan2(sine, cosine) / (2.0 * PI) * width_m).rem_euclid(width_m);
+                best = Self { resultant, width_m, phase_m };
+            }
+            width_m += WIDTH_STEP_M;
         }
-        let resultant = maths::hypot(cosine, sine) / right_m.len() as f64;
-        if resultant > best.0 {
-            best = (resultant, width_m, (maths::atan2(sine, cosine) / (2.0 * PI) * width_m).rem_euclid(width_m));
-        }
-        width_m += WIDTH_STEP_M;
+        best
     }
-    best
 }
 
 /// Returns the mode of each lane that holds vehicles, from left to right (m, to the right).

@@ -24,7 +24,7 @@ use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, SeqAccess, Visitor};
 
 use super::class_names::UnknownClasses;
-use super::collected::{Collected, CollectedRow, CollectedSource, Facts, Position};
+use super::collected::{Collected, CollectedRow, CollectedSource, Facts, Position, derived_speed_mps};
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, wrong_value};
 use super::file_layout::Layout;
@@ -190,9 +190,9 @@ impl Reader {
             if !allowed::LATERAL_M.contains(y_position[k]) {
                 return Err(wrong("y_position", &y_position[k].to_string(), "a position of up to 1000 feet"));
             }
-            let (before, after) = (k.saturating_sub(1), (k + 1).min(count - 1));
-            let span_s = timestamp[after] - timestamp[before];
-            let mps = if span_s > 0.0 { (along_m[after] - along_m[before]) / span_s } else { 0.0 };
+            let mps = derived_speed_mps(k, count, |before, after| {
+                (along_m[after] - along_m[before], timestamp[after] - timestamp[before])
+            });
             let right_m = FOOT_M * y_position[k].abs();
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
             let lane = ((right_m / LANE_M) as u8).saturating_add(1).min(MAX_LANES);

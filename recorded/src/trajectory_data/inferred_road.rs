@@ -15,15 +15,15 @@
 //! vehicle is in the lane that the file names, wherever it drives. Names that follow one another
 //! along the road are one lane; see `stated_lanes`. Lanes beside each other are numbered by their
 //! indices, or by where they lie; see `lane_numbers`. Markings lie halfway between the median positions
-//! in neighbouring lanes. Without names, lanes are steps of the mean lane width, and a vehicle is in
-//! the lane at its position.
+//! in neighbouring lanes. Without names, lanes are steps of the lane width that rows state or that the traffic
+//! shows, and a vehicle is in the lane at its position; see `unnamed_lanes`.
 //!
 //! **Reference line.** It begins as the longest path of a vehicle that keeps its lane, which contains
 //! the weaving and the errors of that vehicle. If rows name lanes, the path is smoothed, and then moved
 //! to where all vehicles show the axis of the road; see `road_axis`. Where fewer than ten vehicles show
-//! it, or rows name no lanes, a decimetre or two remain. If rows name no lanes and most vehicles move to
-//! one side of a reference line by more than half a lane, its vehicle changes lanes, and another path
-//! is taken.
+//! it, a decimetre or two remain. If rows name no lanes, the movements and the positions of all vehicles
+//! show the axis; see `unnamed_lanes`. If most vehicles then move to one side of the first path by more than
+//! half a lane, its vehicle changes lanes, and another path is taken.
 //!
 //! **Doubts.** The lanes on the derived road are compared with the lane changes that the file states;
 //! see `lane_comparison`. A result is in doubt if they disagree, if vehicles of one lane are spread
@@ -41,6 +41,7 @@ use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 use super::reference_line::{Point, Projection, ReferenceLine};
 use super::road_axis::{AXIS_SECTION_M, Departures, LateralFit, LateralPositions};
 use super::stated_lanes::{LaneObserver, LaneRow, StatedLane, Strand, Strands};
+use super::unnamed_lanes::{Movements, axis, lane_width_m};
 
 /// Lane width if the traffic gives none (m).
 const FALLBACK_LANE_WIDTH_M: f64 = DEFAULT_LANE_WIDTH_M;
@@ -201,6 +202,8 @@ fn follows(pose: &Pose, projection: &Projection) -> bool {
 #[derive(Clone, Debug)]
 pub(super) struct InferredRoad {
     lane_width_m: f64,
+    /// `true` if rows state the lane width.
+    states_lane_width: bool,
     directions: Vec<Direction>,
     /// Share of the rows whose vehicles do not follow the road (-).
     astray: f64,
@@ -231,14 +234,15 @@ impl InferredRoad {
         mut each_row: impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
     ) -> Result<Result<Self, TrajectoryFileProblem>, E> {
         let mut changing: BTreeSet<u64> = BTreeSet::new();
-        let (mut paths, mut lane_width_m) = best_paths(&mut each_row, &mut changing)?;
+        let (mut paths, stated_width_m) = best_paths(&mut each_row, &mut changing)?;
+        let lane_width_m = stated_width_m.unwrap_or(FALLBACK_LANE_WIDTH_M);
         for _ in 1..MOST_CHOICES {
             let leaving = leaving_their_lanes(&mut each_row, &paths, lane_width_m)?;
             if leaving.is_empty() {
                 break;
             }
             changing.extend(leaving);
-            (paths, lane_width_m) = best_paths(&mut each_row, &mut changing)?;
+            (paths, _) = best_paths(&mut each_row, &mut changing)?;
         }
         let directions = paths.into_iter().filter_map(|RatedPath { path, .. }| {
             let points = if path.names_lanes { smoothed(&path.points) } else { path.points };
@@ -248,7 +252,9 @@ impl InferredRoad {
             Some(Direction { reference: path.vehicle, ..Direction::along(line, heading_rad) })
         });
         let directions: Vec<Direction> = directions.collect();
-        let mut road = Self { lane_width_m, directions, astray: 0.0, doubts: Vec::new(), is_mirrored: false };
+        let states_lane_width = stated_width_m.is_some();
+        let (astray, doubts, is_mirrored) = (0.0, Vec::new(), false);
+        let mut road = Self { lane_width_m, states_lane_width, directions, astray, doubts, is_mirrored };
         if road.directions.is_empty() {
             return Ok(Err(TrajectoryFileProblem::NothingMoves));
         }
@@ -262,7 +268,7 @@ impl InferredRoad {
     }
 
     /// Joins the named lanes that follow one another, and moves the reference lines to the axes that
-    /// all vehicles show. Without named lanes, nothing changes.
+    /// all vehicles show.
     fn find_axes<E>(&mut self, each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>) -> Result<(), E> {
         for turn in 0..AXIS_TURNS {
             let mut observed = vec![ObservedLanes::new(AXIS_SECTION_M); self.directions.len()];
@@ -282,7 +288,7 @@ impl InferredRoad {
                 }
             })?;
             if !names_lanes {
-                return Ok(());
+                return self.find_unnamed_axes(each_row);
             }
             for (direction, observed) in self.directions.iter_mut().zip(observed) {
                 if turn == 0 {
@@ -293,6 +299,60 @@ impl InferredRoad {
             }
         }
         Ok(())
+    }
+
+    /// Moves the reference lines to the axes that all vehicles show, if rows name no lanes, and takes the
+    /// lane width from the traffic; see `unnamed_lanes`.
+    fn find_unnamed_axes<E>(
+        &mut self,
+        each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for _ in 0..AXIS_TURNS {
+            let mut movements = vec![Movements::default(); self.directions.len()];
+            self.each_following(each_row, |direction, vehicle, projection| {
+                movements[direction].add(vehicle, projection);
+            })?;
+            for (direction, movements) in self.directions.iter_mut().zip(movements) {
+                direction.line = movements.departures().moved(&direction.line, 0.0);
+            }
+        }
+        for _ in 0..AXIS_TURNS {
+            let mut positions = vec![LateralPositions::new(AXIS_SECTION_M); self.directions.len()];
+            let mut latest: Option<(u64, i64)> = None;
+            self.each_following(each_row, |direction, vehicle, projection| {
+                let section = positions[direction].section(projection.s_m);
+                if latest.replace((vehicle, section)) != Some((vehicle, section)) {
+                    positions[direction].add(section, vehicle, projection.d_m);
+                }
+            })?;
+            let fullest = positions.iter().max_by_key(|positions| positions.all().count());
+            let stated_m = self.states_lane_width.then_some(self.lane_width_m);
+            let Some(width_m) = fullest.and_then(|positions| lane_width_m(positions, stated_m)) else { return Ok(()) };
+            self.lane_width_m = width_m;
+            for (direction, positions) in self.directions.iter_mut().zip(&positions) {
+                if let Some(line) = axis(positions, &direction.line, width_m) {
+                    direction.line = line;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Calls `visit` with the direction, the vehicle and the projection of each row whose vehicle follows
+    /// the road.
+    fn each_following<E>(
+        &self,
+        each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
+        mut visit: impl FnMut(usize, u64, &Projection),
+    ) -> Result<(), E> {
+        let mut kept = KeptDirection::default();
+        each_row(&mut |pose| {
+            let Some(direction) = kept.choose(&pose, self) else { return };
+            let projection = self.directions[direction].line.project(pose.point);
+            if follows(&pose, &projection) {
+                visit(direction, pose.vehicle, &projection);
+            }
+        })
     }
 
     /// Compares the lanes in which the rows are placed with the lane changes that the file states.
@@ -595,13 +655,12 @@ struct SectionEntry {
     d_m: f64,
 }
 
-/// Returns the best path of each direction, and the mean lane width that the rows state (m). If no row
-/// states a lane width, it is the usual one. `changing` holds vehicles that change lanes; those whose
-/// rows say so are added.
+/// Returns the best path of each direction, and the mean lane width that the rows state (m), if they do.
+/// `changing` holds vehicles that change lanes; those whose rows say so are added.
 fn best_paths<E>(
     each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
     changing: &mut BTreeSet<u64>,
-) -> Result<(Vec<RatedPath>, f64), E> {
+) -> Result<(Vec<RatedPath>, Option<f64>), E> {
     let mut paths: Vec<RatedPath> = Vec::new();
     let mut current = DrivenPath::default();
     let (mut width_sum_m, mut widths) = (0.0, 0_u32);
@@ -627,8 +686,7 @@ fn best_paths<E>(
         }
     })?;
     keep_best_path(&mut paths, current);
-    let lane_width_m = if widths > 0 { width_sum_m / f64::from(widths) } else { FALLBACK_LANE_WIDTH_M };
-    Ok((paths, lane_width_m))
+    Ok((paths, (widths > 0).then(|| width_sum_m / f64::from(widths))))
 }
 
 /// Returns the vehicles of `paths` that leave their lanes although no row says so: from section to

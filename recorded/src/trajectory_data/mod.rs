@@ -111,6 +111,7 @@ pub(crate) mod test_support;
 mod text;
 mod text_layout;
 mod tracks;
+mod unnamed_lanes;
 mod vissim;
 mod write;
 mod write_in_car;

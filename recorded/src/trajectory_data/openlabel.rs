@@ -24,7 +24,7 @@ use std::io::BufRead;
 use closecall_traffic::{Lane, Time, VehicleClass, maths};
 
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::collected::{Collected, CollectedRow, Facts, Position, distinct_numbers};
+use super::collected::{Collected, CollectedRow, Facts, Position, derived_speed_mps, distinct_numbers};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, shown};
@@ -424,12 +424,12 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
             let point = (in_plane("x of the cuboid", row.x_m)?, in_plane("y of the cuboid", row.y_m)?);
             let heading_rad = checked(&path, "the yaw angle of the cuboid", row.yaw_rad, ANGLE_RAD)?;
             let derived = || {
-                let (before, after) = (k.saturating_sub(1), (k + 1).min(of_object.len() - 1));
-                let span_s = (instants[after] - instants[before]).s();
-                let (from, to) = (&of_object[before], &of_object[after]);
-                let along_m =
-                    (to.x_m - from.x_m) * maths::cos(heading_rad) + (to.y_m - from.y_m) * maths::sin(heading_rad);
-                if span_s > 0.0 { along_m / span_s } else { 0.0 }
+                derived_speed_mps(k, of_object.len(), |before, after| {
+                    let (from, to) = (&of_object[before], &of_object[after]);
+                    let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);
+                    let along_m = dx * maths::cos(heading_rad) + dy * maths::sin(heading_rad);
+                    (along_m, (instants[after] - instants[before]).s())
+                })
             };
             let speed_mps = row.speed_mps.get().unwrap_or_else(derived);
             let vehicle = collected.vehicle(&text.objects[row.object as usize].uid);

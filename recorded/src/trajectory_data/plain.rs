@@ -75,7 +75,7 @@ pub(super) struct PlainColumns {
     time: usize,
     s: usize,
     d: usize,
-    lane: usize,
+    lane: Option<usize>,
     speed: usize,
     acceleration: usize,
     length: usize,
@@ -91,6 +91,8 @@ pub(super) struct PlainColumns {
     orientation: Orientation,
     /// `true` if speeds may be negative, because the position along the road is reversed.
     is_reversed: bool,
+    /// `true` if each row has to state its lane.
+    needs_lanes: bool,
     unknown_classes: UnknownClasses,
 }
 
@@ -110,7 +112,7 @@ impl PlainColumns {
             time: need("time_s")?,
             s: need("s_m")?,
             d: need("d_m")?,
-            lane: need("lane_id")?,
+            lane: header.find("lane_id"),
             speed: need("speed_mps")?,
             acceleration: need("accel_mps2")?,
             length: need("length_m")?,
@@ -123,8 +125,23 @@ impl PlainColumns {
             y: header.find("y_m"),
             orientation: Orientation::default(),
             is_reversed: false,
+            needs_lanes: true,
             unknown_classes: UnknownClasses::default(),
         })
+    }
+
+    /// Parses the lane of a row. Lane 0 is none.
+    fn lane(&self, line: &str, fields: &Fields) -> Result<u8, FieldError> {
+        let text = self.lane.map(|index| fields.get(line, index));
+        match text {
+            None if self.needs_lanes => {
+                let place = "the header has no column `lane_id`".to_owned();
+                Err(TrajectoryFileProblem::NoLanes { place }.into())
+            }
+            None => Ok(0),
+            Some("") if !self.needs_lanes => Ok(0),
+            Some(text) => Ok(integer(text, "lane_id", allowed::LANES)?.unsigned_abs() as u8),
+        }
     }
 }
 
@@ -147,6 +164,10 @@ impl TextLayout for PlainColumns {
 
     fn expect_reversed(&mut self) {
         self.is_reversed = true;
+    }
+
+    fn expect_no_lanes(&mut self) {
+        self.needs_lanes = false;
     }
 
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
@@ -175,7 +196,7 @@ impl TextLayout for PlainColumns {
             clock: Clock::Continuous,
             s_m: real(self.s, "s_m", allowed::POSITION_M)?,
             d_m: -real(self.d, "d_m", allowed::LATERAL_M)?,
-            lane: whole(self.lane, "lane_id", allowed::LANES)?.unsigned_abs() as u8,
+            lane: self.lane(line, fields)?,
             speed_mps: signed_speed_mps.abs(),
             // Beside a negative speed, the sign of the acceleration is unknown: the speeds give it.
             acceleration_mps2: optional_number(acceleration, "accel_mps2", allowed::ACCELERATION_MPS2)?

@@ -133,24 +133,52 @@ impl<L: Copy + Ord> LateralPositions<L> {
         deviations_m
     }
 
+    /// Returns the label and the position of each entry (m to the left).
+    pub(super) fn all(&self) -> impl Iterator<Item = (L, f64)> {
+        self.sections.values().flatten().copied()
+    }
+
+    /// Returns the positions with the lane at each of them.
+    pub(super) fn by_position<M: Copy + Ord>(&self, lane: impl Fn(f64) -> M) -> LateralPositions<M> {
+        let mut positions = LateralPositions::new(self.section_m);
+        for (section, vehicles) in &self.sections {
+            vehicles.iter().for_each(|(_, d_m)| positions.add(*section, lane(*d_m), *d_m));
+        }
+        positions
+    }
+
     /// Returns the axis: the line, moved by its departures. Where no section shows a departure, the
     /// line moves as in the nearest section that shows one.
     pub(super) fn axis(&self, line: &ReferenceLine) -> ReferenceLine {
-        let departures = self.fit().departures.averaged();
-        let ends_m = departures.ends_m().zip(line.length_m());
-        let Some(((first_m, last_m), length_m)) = ends_m else { return line.clone() };
+        self.fit().departures.averaged().moved(line, 0.0)
+    }
+}
+
+impl Departures {
+    /// Creates departures from pairs of the distance along the line and the departure to the left (m), in order.
+    pub(super) fn new(departures_m: Vec<(f64, f64)>) -> Self {
+        Self(departures_m)
+    }
+
+    /// Returns the line, moved by the departures and by `left_m` to the left. Without departures, a line
+    /// moves by `left_m` alone.
+    pub(super) fn moved(&self, line: &ReferenceLine, left_m: f64) -> ReferenceLine {
+        let Some(length_m) = line.length_m() else { return line.clone() };
+        let (first_m, last_m) = match self.ends_m() {
+            Some(ends_m) => ends_m,
+            None if left_m == 0.0 => return line.clone(),
+            None => (0.0, length_m),
+        };
         let (from_m, to_m) = (first_m.min(0.0), last_m.max(length_m));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
         let steps = (((to_m - from_m) / AXIS_SECTION_M).ceil() as usize).clamp(1, MAX_POINTS);
         let point = |step: usize| -> Option<Point> {
             let s_m = from_m + step as f64 * AXIS_SECTION_M;
-            line.beside(s_m, departures.at(s_m))
+            line.beside(s_m, self.at(s_m) + left_m)
         };
         ReferenceLine::through((0..=steps).filter_map(point))
     }
-}
 
-impl Departures {
     /// Returns the departure at `s_m` (m). It is linear between two sections and constant beyond both
     /// ends.
     pub(super) fn at(&self, s_m: f64) -> f64 {
@@ -169,7 +197,7 @@ impl Departures {
     }
 
     /// Returns the means of the departures within [`AVERAGED_M`].
-    fn averaged(&self) -> Self {
+    pub(super) fn averaged(&self) -> Self {
         let Self(departures_m) = self;
         let mean = |&(at_m, _): &(f64, f64)| {
             let first = departures_m.partition_point(|(m, _)| *m < at_m - AVERAGED_M);

@@ -108,6 +108,10 @@ pub(super) trait RowSource {
     /// negative. It is called before the first row.
     fn expect_reversed(&mut self) {}
 
+    /// States that no lane is taken as recorded, so that rows may state none. It is called before the first
+    /// row.
+    fn expect_no_lanes(&mut self) {}
+
     /// States that the lateral position is mirrored. It is called before the first row.
     fn expect_mirrored(&mut self) {}
 

@@ -121,6 +121,10 @@ impl<R: BufRead> RowSource for TextSource<R> {
         self.format.columns.expect_reversed();
     }
 
+    fn expect_no_lanes(&mut self) {
+        self.format.columns.expect_no_lanes();
+    }
+
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         let Self { lines, format, fields, name, first, usual_last_field, location } = self;
         loop {

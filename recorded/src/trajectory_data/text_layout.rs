@@ -49,6 +49,10 @@ pub(super) trait TextLayout {
     /// negative. It is called before the first row.
     fn expect_reversed(&mut self) {}
 
+    /// States that no lane is taken as recorded, so that rows may state none. It is called before the first
+    /// row.
+    fn expect_no_lanes(&mut self) {}
+
     /// Checks, at the end of the file, that nothing is missing.
     ///
     /// # Errors

@@ -144,6 +144,8 @@ pub struct Tracks<'a> {
     axis_warning: Option<String>,
     /// Why the recorded lanes are in doubt.
     lane_doubt: Option<String>,
+    /// Why the times, the positions or the speeds are in doubt.
+    speed_doubt: Option<String>,
     /// `true` if the file is of a simulation, in which a lane change may take a single step.
     is_simulated: bool,
     lanes: LaneReliability,
@@ -172,6 +174,9 @@ impl<'a> Tracks<'a> {
         if options.axes.reverse_s {
             source.expect_reversed();
         }
+        if options.lanes != LaneReliability::Reliable {
+            source.expect_no_lanes();
+        }
         if options.axes.mirror_d {
             source.expect_mirrored();
         }
@@ -185,6 +190,7 @@ impl<'a> Tracks<'a> {
             axes: Axes::default(),
             axis_warning: None,
             lane_doubt: None,
+            speed_doubt: None,
             is_simulated: false,
             lanes: options.lanes,
             estimated: None,
@@ -269,7 +275,8 @@ impl<'a> Tracks<'a> {
     /// Returns `true` if a warning on the file or on the rows so far says that lane changes may be
     /// wrong or missing, or that the recorded lanes are none.
     pub fn is_in_doubt(&self) -> bool {
-        self.is_coarse() || self.doubts_lanes() || self.continuity().hides_lane_changes() || self.source.is_in_doubt()
+        let is_of_file = self.doubts_lanes() || self.speed_doubt.is_some() || self.source.is_in_doubt();
+        is_of_file || self.is_coarse() || self.continuity().hides_lane_changes()
     }
 
     /// Returns `true` if a warning says that the recorded lanes are none: vehicles of one lane drive
@@ -310,7 +317,8 @@ impl<'a> Tracks<'a> {
             )
         });
         let coarse = self.is_coarse().then(|| coarse_frames(self.period));
-        let notes = self.source.warnings().into_iter().chain(self.axis_warning.clone()).chain(self.lane_doubt.clone());
+        let doubts = self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).cloned();
+        let notes = self.source.warnings().into_iter().chain(doubts);
         notes.chain(coarse).chain(unknown_lanes).collect()
     }
 
@@ -478,6 +486,7 @@ impl<'a> Tracks<'a> {
         rows.iter_mut().for_each(|row| self.axes.turn(row));
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         plausible::check(beginning, layout, clock)?;
+        self.speed_doubt = plausible::doubt(beginning, clock);
         // Other readers derive the lanes from the positions, so that only an option can part them.
         let states_lanes =
             matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);

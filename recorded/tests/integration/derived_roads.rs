@@ -1,5 +1,5 @@
-//! Roads that are derived from traffic whose rows name lanes: a lane change is a change of the named
-//! lane, wherever vehicles drive and however many names a lane has.
+//! Roads that are derived from traffic. If rows name lanes, a lane change is a change of the named lane,
+//! wherever vehicles drive and however many names a lane has. If they do not, the traffic shows its lanes.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use closecall_recorded::filters::smooth;
-use closecall_recorded::lane_change::detect;
-use closecall_recorded::trajectory_data::{TrajectoryData, TrajectoryFileProblem, read};
+use closecall_recorded::lane_change::{LaneReliability, Score, detect, read_references, score};
+use closecall_recorded::trajectory_data::{ReadOptions, TrajectoryData, TrajectoryFileProblem, open_from, read};
 use closecall_traffic::{Side, Time, Trajectory, maths};
 
 use crate::support::{data_folder, read_text};
@@ -239,6 +239,31 @@ fn vehicles_of_us_101_that_keep_their_named_lane_change_no_lane_in_dense_traffic
         let lane_4: Vec<Seen> = rows(&keepers).into_iter().filter(|row| row.lane == 4).collect();
         let text = sumo(&lane_4, Course::Straight, counted_from_right(Edges::One));
         assert_eq!(lane_changes_of(&read_text(text.as_bytes()).unwrap()), [], "{name}, lane 4");
+    }
+}
+
+#[test]
+fn us_101_in_a_plane_without_names_of_lanes_has_nine_of_ten_lane_changes() {
+    let Some(folder) = data_folder() else { return };
+    let references = read_references(&folder.join("ngsim_us101/reference_lane_changes.csv")).unwrap();
+    for course in [Course::Straight, Course::Bend] {
+        let mut total = Score::default();
+        for name in ["us101_a", "us101_b", "us101_f", "us101_g", "us101_h"] {
+            let Some((recorded, _)) = us_101(name) else { return };
+            let text = sumo(&rows(&recorded.trajectories), course, |_| String::new()).replace(" lane=\"\"", "");
+            let options = ReadOptions { lanes: LaneReliability::Unreliable, ..ReadOptions::default() };
+            let tracks = open_from(text.as_bytes(), Path::new("made-up.xml"), options, usize::MAX).unwrap();
+            let data = tracks.collect_all().unwrap();
+            let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == recorded.name).collect();
+            let spans = data.trajectories.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect();
+            let scored = score(&detect(&smooth(&data)), &listed, &spans);
+            eprintln!("{name}, {course:?}: recall {}, precision {}", scored.recall, scored.precision);
+            total.add(&scored);
+        }
+        let Score { recall, precision, .. } = total;
+        assert!(recall.of >= 15 && precision.of >= 20, "too little data for a statement: {recall}, {precision}");
+        assert!(recall.hits * 100 >= recall.of * 90, "{course:?}: recall {recall}");
+        assert!(precision.hits * 100 >= precision.of * 90, "{course:?}: precision {precision}");
     }
 }
 

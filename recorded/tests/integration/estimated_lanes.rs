@@ -7,7 +7,7 @@ use std::path::Path;
 
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::{LaneChange, LaneReliability, Score, detect, read_references, score};
-use closecall_recorded::trajectory_data::{ReadOptions, TrajectoryData, open_from, read_with};
+use closecall_recorded::trajectory_data::{ReadOptions, TrajectoryData, TrajectoryFileProblem, open_from, read_with};
 use closecall_traffic::{Lane, Side, maths};
 
 use crate::support::data_folder;
@@ -76,6 +76,42 @@ fn lane_changes_are_found_by_the_lanes_that_the_traffic_shows() {
     }
     for change in &changes {
         assert!((change.crossing_s - 6.5).abs() < 0.25 && change.complete, "{change:?}");
+    }
+}
+
+#[test]
+fn a_plain_file_without_lanes_is_read_if_they_are_to_be_estimated() {
+    let Some(folder) = data_folder() else { return };
+    let path = folder.join("ngsim_us101/trajectories/us101_a.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let column = text.lines().next().unwrap().split(',').position(|name| name == "lane_id").unwrap();
+    let edited = |edit: &dyn Fn(&mut Vec<&str>)| {
+        let line = |line: &str| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            edit(&mut fields);
+            fields.join(",") + "\n"
+        };
+        text.lines().map(line).collect::<String>()
+    };
+    let without = edited(&|fields| {
+        fields.remove(column);
+    });
+    let empty = edited(&|fields| {
+        if fields[column] != "lane_id" {
+            fields[column] = "";
+        }
+    });
+    let read = |text: &str, options: ReadOptions| {
+        open_from(text.as_bytes(), Path::new("made-up.csv"), options, usize::MAX)?.collect_all()
+    };
+    let error = read(&without, ReadOptions::default()).unwrap_err();
+    assert!(matches!(error.problem, TrajectoryFileProblem::NoLanes { .. }), "{error}");
+    assert!(error.to_string().contains("no column `lane_id`"), "{error}");
+    assert!(read(&empty, ReadOptions::default()).unwrap_err().to_string().contains("`lane_id`"));
+    let expected = listed(&detect(&smooth(&read_with(&path, WITHOUT_LANES()).unwrap())));
+    assert!(expected.len() > 10, "{}", expected.len());
+    for text in [without, empty] {
+        assert_eq!(listed(&detect(&smooth(&read(&text, WITHOUT_LANES()).unwrap()))), expected);
     }
 }
 

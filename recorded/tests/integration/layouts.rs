@@ -235,6 +235,27 @@ fn markings_of_highd_beside_its_traffic_and_a_wrong_frame_rate_are_named() {
 }
 
 #[test]
+fn a_frame_rate_that_is_wrong_by_a_fifth_is_in_doubt() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let path = folder.path().join("07_recordingMeta.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let with_rate = |rate: &str| {
+        std::fs::write(&path, text.replace("7,25,", &format!("7,{rate},"))).unwrap();
+        let data = read(folder.path()).unwrap();
+        let note = data.notes.iter().find(|note| note.contains("than the recorded speeds make")).cloned();
+        assert_eq!(data.is_in_doubt, note.is_some(), "{rate} Hz: {:?}", data.notes);
+        note
+    };
+    assert_eq!(with_rate("25"), None);
+    assert_eq!(with_rate("26"), None, "errors of speeds are as large");
+    let note = with_rate("30").expect("a note");
+    assert!(note.starts_with("positions advance 20 % further") && note.contains("frame rate"), "{note}");
+    let note = with_rate("20").expect("a note");
+    assert!(note.starts_with("positions advance 20 % less far"), "{note}");
+}
+
+#[test]
 fn highd_traffic_beside_its_carriageway_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());

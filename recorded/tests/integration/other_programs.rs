@@ -535,6 +535,21 @@ fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
 }
 
 #[test]
+fn a_number_of_i24_motion_that_is_given_to_another_vehicle_splits_its_track() {
+    // From frame 100 on, the number belongs to a vehicle 3,000 ft ahead.
+    let text = i24(true).lines().next().unwrap().trim_end_matches(',').to_owned() + "]";
+    let clean = read_text(text.as_bytes()).unwrap();
+    let mut document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for x in &mut document[0]["x_position"].as_array_mut().unwrap()[100..] {
+        *x = (x.as_f64().unwrap() + 3_000.0).into();
+    }
+    let data = read_text(document.to_string().as_bytes()).unwrap();
+    assert_eq!((clean.continuity.jumps, data.continuity.jumps, data.trajectories.len()), (0, 1, 2));
+    let speeds = data.trajectories.iter().flat_map(|track| &track.points).map(|point| point.speed_mps);
+    assert!(speeds.clone().count() == 250 && speeds.into_iter().all(|mps| (mps - 30.48).abs() < 0.05));
+}
+
+#[test]
 fn malformed_json_is_refused() {
     let good = i24(true);
     for (text, needed) in [

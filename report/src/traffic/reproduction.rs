@@ -108,6 +108,12 @@ impl Reproduction {
     }
 }
 
+/// Returns a value that is shown with two digits: one beyond its bound is rounded up, so that it does not look
+/// like the bound.
+fn shown_beyond(value: f64, bound: f64) -> f64 {
+    if value > bound { (100.0 * value).ceil() / 100.0 } else { value }
+}
+
 impl fmt::Display for Reproduction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let crossing = self.crosses_later_s.map_or("does not cross the marking".to_owned(), |later_s| match later_s {
@@ -124,9 +130,9 @@ impl fmt::Display for Reproduction {
             number(self.desired_speed_mps),
             number(self.cc1_s),
             self.largest_along_m,
-            100.0 * self.relative_error,
+            100.0 * shown_beyond(self.relative_error, LARGEST_RELATIVE_ERROR),
             100.0 * LARGEST_RELATIVE_ERROR,
-            self.across_rms_m,
+            shown_beyond(self.across_rms_m, LARGEST_ACROSS_M),
             LARGEST_ACROSS_M,
         )?;
         match &self.collision {
@@ -201,4 +207,17 @@ pub fn step_zero(
     let is_simple_closer = simple.reproduction.relative_error < full.reproduction.relative_error;
     let closer = if is_simple_closer { simple } else { full };
     Err(StepZeroError::NotReproduced(Box::new(closer.reproduction)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_beyond_its_bound_does_not_look_like_the_bound() {
+        assert_eq!(format!("{:.2}", shown_beyond(0.2801, 0.28)), "0.29");
+        assert_eq!(format!("{:.2}", shown_beyond(0.2799, 0.28)), "0.28");
+        assert_eq!(format!("{:.0} %", 100.0 * shown_beyond(0.2901, 0.29)), "30 %");
+        assert!(shown_beyond(f64::NAN, 0.28).is_nan());
+    }
 }
