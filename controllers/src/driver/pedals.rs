@@ -26,7 +26,7 @@ use super::COASTING_DECELERATION_MPS2;
 
 /// Largest rate at which a driver builds up braking if the scenario gives none (m/s³) (UN
 /// Regulation 157).
-const DEFAULT_BRAKE_BUILD_UP_MPS3: f64 = 12.65;
+pub(crate) const DEFAULT_BRAKE_BUILD_UP_MPS3: f64 = 12.65;
 
 /// Range of the rate at which a driver builds up braking (m/s³).
 const BRAKE_BUILD_UP_RANGE: Range = Range::closed(1.0, 100.0);
