@@ -91,9 +91,10 @@ const KNOT_STEPS: u8 = 6;
 /// at which position and slope are exact. Between them it deviates by less than 3 mm, on clothoids as
 /// at a jump from a line to an arc of the smallest radius. Beyond the knots, it is the tangent.
 ///
-/// The bound holds for a change of the curvature of up to 1e-4 1/m². The shortest clothoid of a
-/// motorway with a radius of 400 m has 5.6e-5 1/m² (RAA 2008: parameter A of at least a third of the
-/// radius).
+/// The bound holds for a change of the curvature of up to 1.25e-4 1/m², which is 1/A² for the
+/// parameter A of a clothoid. The least A of German motorways is 300 m, 160 m and 90 m in the design
+/// classes EKA 1 A, EKA 2 and EKA 3: 1.1e-5 to 1.2e-4 1/m² (FGSV 2008, RAA, as
+/// <https://www.bauformeln.de/strassenbau/grenz-und-richtwerte/autobahnen/> reproduces its table).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathCourse {
     /// Lateral position (m) and slope at each knot.

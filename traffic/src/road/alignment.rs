@@ -26,7 +26,8 @@ use crate::{Check, ConfigError, Num, Parameters, Problem, Range, maths};
 /// Largest angle by which one step of the quadrature turns (rad).
 const STEP_RAD: f64 = 0.5;
 /// Least distance of two points of different positions (m). It bounds the rate of change of the
-/// curvature. Assumption: 1 to 20 are plausible, and clothoids of motorways are above 40 m long.
+/// curvature. Assumption: 1 to 20 are plausible. A clothoid of German motorways is A²/R long, which is
+/// 20 m or more at a radius of 400 m (FGSV 2008, RAA: A is 90 m or more).
 const LEAST_SPACING_M: f64 = 1.0;
 /// Step of the inverse below which it has converged (m), and its greatest number of steps.
 const CONVERGED_M: f64 = 1e-10;

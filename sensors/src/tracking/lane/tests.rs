@@ -22,8 +22,8 @@ fn errors(road: &Road, state: &VehicleState) -> [f64; 2] {
 
 #[test]
 fn the_path_along_clothoids_is_the_line_of_the_ego_on_the_road() {
-    // 1e-4 1/m² and an inflection, and the shortest clothoid of a motorway (RAA 2008).
-    let s_curve = alignment(&[[0.0, 0.0], [25.0, 0.0025], [100.0, 0.0025], [145.0, -0.002], [300.0, -0.002]]);
+    // The shortest clothoid of a motorway, and an inflection.
+    let s_curve = alignment(&[[0.0, 0.0], [20.0, 0.0025], [100.0, 0.0025], [145.0, -0.002], [300.0, -0.002]]);
     for road in [s_curve, s_curve.reversed()] {
         for place in [30.0, 90.0, 130.0, 200.0, 290.0] {
             let s_m = if road.is_reversed() { -place } else { place };
