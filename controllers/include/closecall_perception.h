@@ -92,7 +92,7 @@ typedef struct {
     double ego_length_m;     /* (m) */
     double ego_width_m;      /* (m) */
     double lane_width_m;     /* (m) */
-    double curvature_per_m;  /* curvature of the road (1/m), positive to the left */
+    double curvature_per_m;  /* curvature of the road (1/m), positive to the left; NaN if it changes along the road */
     double speed_limit_mps;  /* (m/s) */
     uint32_t lanes;          /* number of lanes; lane 1 is the leftmost */
     int32_t overtaking_side; /* CLOSECALL_SIDE_... */

@@ -115,8 +115,8 @@ class Road:
     #: Number of lanes; lane 1 is the leftmost.
     lanes: int
     lane_width_m: float
-    #: Curvature (1/m), positive to the left.
-    curvature_per_m: float
+    #: Curvature (1/m), positive to the left; ``None`` if it changes along the road.
+    curvature_per_m: float | None
     speed_limit_mps: float
     overtaking_side: Side
 

@@ -313,7 +313,7 @@ fn setup_json(settings: &EgoSettings, road: &Road) -> String {
         "road": {
             "lanes": road.lanes(),
             "lane_width_m": road.lane_width_m(),
-            "curvature_per_m": road.curvature_per_m(),
+            "curvature_per_m": road.constant_curvature_per_m(),
             "speed_limit_mps": road.speed_limit_mps(),
             "overtaking_side": road.overtaking_side(),
         },

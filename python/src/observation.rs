@@ -68,7 +68,7 @@ pub(crate) fn write(input: &EgoInput<'_>, front: Option<Front>, max_tracks: usiz
         f64::from(road.lanes()),
         road.lane_width_m(),
         road.speed_limit_mps(),
-        road.curvature_per_m(),
+        input.curvature_per_m,
     ]);
     values.extend([works.front, works.surround, works.rear].map(flag));
     let lead = front.map_or([0.0; 4], |lead| [1.0, lead.gap_m, lead.speed_mps, lead.acceleration_mps2]);

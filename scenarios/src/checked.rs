@@ -404,8 +404,8 @@ impl Entering<'_> {
         if road.entry_lane() != Some(number) {
             return Ok(());
         }
-        let rest_m = (lane.to_m - self.start.s_m) * (1.0 - road.curvature_per_m() * self.start.d_m)
-            - 0.5 * self.vehicle.dimensions.length_m;
+        let rest_m =
+            road.path_length_m([self.start.s_m, lane.to_m], self.start.d_m) - 0.5 * self.vehicle.dimensions.length_m;
         let refuse = |key, other, rule| Err(ConfigError::new(key, Problem::Contradiction { other, rule }));
         match self.driver {
             CheckedDriver::Human(HumanDriver::Prescribed(driver)) => {

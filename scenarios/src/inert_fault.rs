@@ -94,7 +94,7 @@ fn refuse_glare(
 ) -> Result<(), ConfigError> {
     let sun = sensors.camera().sun;
     // On a curved road, the sun is behind the ego sooner or later.
-    let is_ahead = road.curvature_per_m() == 0.0 && maths::cos(sun.azimuth_rad) * maths::cos(sun.elevation_rad) >= 0.0;
+    let is_ahead = road.is_straight() && maths::cos(sun.azimuth_rad) * maths::cos(sun.elevation_rad) >= 0.0;
     let is_day = environment.light == Light::Day;
     for (index, entry) in fault.rear_camera.iter().enumerate() {
         let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, .. } = entry.clone();

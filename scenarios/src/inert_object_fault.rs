@@ -83,8 +83,10 @@ pub(super) fn refuse_of_map(
             contradiction("rails-missing", "road.guard-rails", "only guard rails that stand there can be missing");
         return Err(located(error));
     }
+    let [least_per_m, most_per_m] = road.curvature_range_per_m();
     let of_map = [
-        (&odometry.curvature_per_m, "curvature-per-m", road.curvature_per_m(), Road::CURVATURE_PER_M),
+        (&odometry.curvature_per_m, "curvature-per-m", least_per_m, Road::CURVATURE_PER_M),
+        (&odometry.curvature_per_m, "curvature-per-m", most_per_m, Road::CURVATURE_PER_M),
         (&odometry.lane_width_m, "lane-width-m", road.lane_width_m(), Road::LANE_WIDTH_M),
     ];
     for (num, key, actual, range) in of_map {
@@ -141,6 +143,14 @@ mod tests {
             ),
             (
                 "road.curvature-per-m = 0.002\n[fault.odometry]\ncurvature-per-m = 0.0006".to_owned(),
+                "fault.odometry.curvature-per-m",
+                "from -0.0025 to 0.0025",
+            ),
+            // The curvature at the other end of the clothoid would stay in the range.
+            (
+                "road.alignment = [{ s-m = 0.0, curvature-per-m = 0.0 }, { s-m = 500.0, curvature-per-m = -0.002 }]\n\
+                 [fault.odometry]\ncurvature-per-m = -0.0006"
+                    .to_owned(),
                 "fault.odometry.curvature-per-m",
                 "from -0.0025 to 0.0025",
             ),

@@ -231,6 +231,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
             lanes: approach.lanes,
             lane_width_m: rounded(approach.lane_width_m),
             curvature_per_m: Num::Fixed(0.0),
+            alignment: Vec::new(),
             speed_limit_mps: rounded(highest("cruise-mps") + highest("closing-mps")),
             overtaking_side: approach.direction(),
             guard_rails: false,

@@ -77,16 +77,20 @@ pub(crate) fn turn_back(track: &mut Track) {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::VehicleClass;
     use closecall_traffic::ego_frame::EgoFrame;
+    use closecall_traffic::{Alignment, AlignmentPoint, VehicleClass};
 
     use super::*;
     use crate::testing::{scene_vehicle, with_speed};
 
     #[test]
     fn a_turned_vehicle_lies_on_the_opposite_side_of_the_ego_at_the_same_distance() {
-        for curvature_per_m in [0.0, 0.001, -0.001] {
-            let road = Road::straight(3).with_curvature(curvature_per_m).with_guard_rails();
+        let points = [(0.0, 0.0), (500.0, 0.001), (540.0, 0.001), (600.0, -0.001)];
+        let points = points.map(|(s_m, curvature_per_m)| AlignmentPoint { s_m, curvature_per_m });
+        let bent = [0.0, 0.001, -0.001].map(|curvature_per_m| Road::straight(3).with_curvature(curvature_per_m));
+        let course = Road::straight(3).with_alignment(Alignment::new(&points).unwrap());
+        for road in bent.into_iter().chain([course]) {
+            let road = road.with_guard_rails();
             let environment = Environment::CLEAR_DAY;
             let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0, -5.6), 30.0);
             ego.state.heading_rad = 0.02;
@@ -106,7 +110,9 @@ mod tests {
             // Turned twice, everything is where it was.
             let again = HalfTurn::of(&seen, Vec::new());
             assert!((again.scene().ego.state.s_m - 500.0).abs() < 1e-6);
-            assert!((again.scene().road.curvature_per_m() - curvature_per_m).abs() < 1e-12);
+            let [curvature_per_m, expected_per_m] =
+                [again.scene().road, &road].map(|road| road.curvature_at_per_m(520.0));
+            assert!((curvature_per_m - expected_per_m).abs() < 1e-12);
         }
     }
 }

@@ -52,7 +52,6 @@ pub(crate) fn transform_scene<'a>(
 ) -> Result<EgoFrame<'a>, SensorError> {
     check_finite(&scene.ego, scene)?;
     let frame = EgoFrame::new(scene.road, &scene.ego.state);
-    let curvature_per_m = scene.road.curvature_per_m();
     others.clear();
     for vehicle in scene.others {
         check_finite(vehicle, scene)?;
@@ -63,7 +62,7 @@ pub(crate) fn transform_scene<'a>(
         let (road_sin, road_cos) = maths::sin_cos(state.heading_rad);
         // On the inside of a bend, a vehicle passes more metres of the reference line than it
         // drives.
-        let path_scale = 1.0 - curvature_per_m * state.d_m;
+        let path_scale = scene.road.path_scale(state.s_m, state.d_m);
         others.push(OtherVehicle {
             actor: vehicle.actor,
             class: vehicle.vehicle.class,

@@ -147,6 +147,11 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
     let lidars = options.lidars.clone();
     let mut recording = Recording::open(&args.recording, options)?;
     let poses = recording.poses(args.poses.as_deref())?;
+    if scenario.road.alignment().is_some() && !poses.has_map() {
+        let message = "the scenario has `road.alignment`, on which the poses have no place: they need `s_m`, `d_m` and \
+                       `heading_rad`; without them, the road is the arc that the ego drives";
+        return Err(CliError::usage(message));
+    }
     let labels = labels(&recording, args.labels.as_deref())?;
     let ego = scenario.vehicle(scenario.ego, key);
     let frame = match args.frame {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use closecall_scenarios::library;
-use closecall_traffic::{Road, maths};
+use closecall_traffic::{Alignment, AlignmentPoint, Road, maths};
 
 use crate::support::{ROOT, closecall, code, message, stdout};
 
@@ -47,13 +47,24 @@ fn parts<'a>(text: &'a str, start: &str) -> Vec<&'a str> {
 #[test]
 fn the_open_loop_form_has_the_positions_of_the_trace() {
     let folder = tempfile::tempdir().unwrap();
-    for (index, curvature) in [0.0, 0.002].into_iter().enumerate() {
-        let words = format!("paper-figure 0 --sensors object --set road.curvature-per-m={curvature}");
+    let points = [[-100.0, 0.0], [100.0, 0.001], [300.0, 0.001], [500.0, -0.001], [700.0, -0.001], [700.0, 0.0]];
+    let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+    let written = points
+        .map(|AlignmentPoint { s_m, curvature_per_m }| format!("{{s-m={s_m:?},curvature-per-m={curvature_per_m:?}}}"));
+    let straight = Road::straight(3);
+    let roads = [
+        ("curvature-per-m=0.0".to_owned(), straight),
+        ("curvature-per-m=0.002".to_owned(), straight.with_curvature(0.002)),
+        (format!("alignment=[{}]", written.join(",")), straight.with_alignment(Alignment::new(&points).unwrap())),
+    ];
+    for (index, (key, road)) in roads.into_iter().enumerate() {
+        let words = format!("paper-figure 0 --sensors object --set road.{key}");
         let files = exported(&words, &folder.path().join(index.to_string()));
         let trace = folder.path().join("trace.csv");
-        let run_words = "run paper-figure --sample 0 --sensors object --set road.curvature-per-m";
-        stdout(&run(&format!("{run_words}={curvature} --trace"), &trace), 0);
-        let road = Road::straight(3).with_curvature(curvature);
+        let run_words = "run paper-figure --sample 0 --sensors object --set road";
+        stdout(&run(&format!("{run_words}.{key} --trace"), &trace), 0);
+        // The file has the pieces of the course that vehicles use.
+        assert_eq!(files["road.xodr"].matches("<spiral").count(), if index == 2 { 2 } else { 0 });
         let catalog = folder.path().join(index.to_string()).join("catalogs/vehicles/VehicleCatalog.xosc");
         let catalog = fs::read_to_string(catalog).unwrap();
         let ahead_m: BTreeMap<_, _> = parts(&catalog, "<Vehicle ")
@@ -69,7 +80,7 @@ fn the_open_loop_form_has_the_positions_of_the_trace() {
             for vertex in parts(trajectory, "<Vertex") {
                 let [x, y, h] = ["x", "y", "h"].map(|key| number(vertex, key));
                 let (sin, cos) = maths::sin_cos(h);
-                let centre = road.road_position_m(x + ahead_m[name] * cos, y + ahead_m[name] * sin);
+                let centre = road.road_position_m(x + ahead_m[name] * cos, y + ahead_m[name] * sin, 0.0);
                 positions.insert((name.to_owned(), (number(vertex, "time") * 1e3).round() as i64), centre);
             }
         }
@@ -228,6 +239,11 @@ fn the_quality_checkers_find_no_issue_in_any_scenario_of_the_library() {
         let case = folder.path().join(name.replace('/', "-"));
         stdout(&run(&format!("tool export {name} --sensors ground-truth -o"), &case), 0);
     }
+    // A line, a spiral, an arc, and a spiral through an inflection.
+    let course = "[{s-m=0.0,curvature-per-m=0.0},{s-m=200.0,curvature-per-m=0.002},\
+                  {s-m=400.0,curvature-per-m=0.002},{s-m=700.0,curvature-per-m=-0.001}]";
+    let words = format!("tool export paper-figure --sensors ground-truth --set road.alignment={course} -o");
+    stdout(&run(&words, &folder.path().join("alignment")), 0);
     let said = quality(&python, folder.path());
     assert!(said.ends_with(", 0 issues\n"), "{said}");
     let files: usize = said.lines().last().unwrap().split(' ').next().unwrap().parse().unwrap();

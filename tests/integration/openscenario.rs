@@ -253,7 +253,7 @@ fn a_position_in_the_plane_is_a_position_on_the_road() {
     for (attributes, road, word) in [
         ("x=\"50\" y=\"-1.75\" h=\"1.57\"", straight.as_str(), "not the direction of the road"),
         ("x=\"50\" y=\"9\" h=\"0\"", straight.as_str(), "10.75 m beside the nearest lane"),
-        ("x=\"50\" y=\"-1.75\"", anywhere.as_str(), "needs a road that is one line or one arc"),
+        ("x=\"50\" y=\"-1.75\"", anywhere.as_str(), "needs a road whose course is imported"),
     ] {
         fs::remove_file(&output).ok();
         let refused = imported(&written(folder.path(), &in_plane(attributes), road), &output, &[]);
@@ -1192,4 +1192,55 @@ fn the_events_of_a_cut_in_are_those_of_esmini_within_a_step() {
     let said = stdout(&imported(&path, &output, &[]), 0);
     assert!((time_of(&said, "OvertakerBrakeEvent begins") - 7.74).abs() <= STEP_S, "{said}");
     assert!((time_of(&said, "CutInManeuver ends") - 16.74).abs() <= STEP_S, "{said}");
+}
+
+/// Returns the alignment of an imported scenario, as pairs of position and curvature.
+fn alignment_of(scenario: &Path) -> Vec<[f64; 2]> {
+    let scenario: toml::Table = toml::from_str(&fs::read_to_string(scenario).unwrap()).unwrap();
+    let points = scenario["road"]["alignment"].as_array().unwrap();
+    points.iter().map(|point| ["s-m", "curvature-per-m"].map(|key| point[key].as_float().unwrap())).collect()
+}
+
+#[test]
+fn a_road_of_lines_arcs_and_spirals_is_the_alignment_of_the_scenario() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let course = "road.alignment=[{s-m=0.0,curvature-per-m=0.0},{s-m=200.0,curvature-per-m=0.002},\
+                  {s-m=300.0,curvature-per-m=0.002},{s-m=450.0,curvature-per-m=-0.001}]";
+    let export = ["tool", "export", "paper-figure", "--form", "closed-loop", "--set", course, "-o"];
+    stdout(&closecall([&export[..], &[case.to_str().unwrap()]].concat()), 0);
+    let output = folder.path().join("scenario.toml");
+    stdout(&imported(&case.join("closed-loop.xosc"), &output, &[]), 0);
+    let points = alignment_of(&output);
+    // The road of the file begins before the first vehicle, and ends behind the last one.
+    let start_m = points[1][0];
+    let inner: Vec<[f64; 2]> = points[1..points.len() - 1].iter().map(|[s, k]| [s - start_m, *k]).collect();
+    assert_eq!(inner.len(), 4, "{points:?}");
+    for ([s_m, curvature_per_m], expected) in
+        inner.iter().zip([[0.0, 0.0], [200.0, 0.002], [300.0, 0.002], [450.0, -0.001]])
+    {
+        assert!((s_m - expected[0]).abs() < 1e-9 && (curvature_per_m - expected[1]).abs() < 1e-12, "{points:?}");
+    }
+    let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
+    json(&closecall(run), 0);
+}
+
+#[test]
+fn a_road_of_cubics_is_followed_within_the_distance_that_the_note_states() {
+    let Some(data) = closecall_testing::data() else { return };
+    let path = data.join("esmini_openx/xosc/cut-in.xosc");
+    if !path.is_file() {
+        closecall_testing::skip(closecall_testing::Need::Data, "CLOSECALL_DATA has no esmini_openx");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    stdout(&imported(&path, &output, &[]), 0);
+    let text = fs::read_to_string(&output).unwrap();
+    let note = text.split_once("pieces with a linear curvature follow them within ").unwrap().1;
+    let within_m: f64 = note.split(' ').next().unwrap().parse().unwrap();
+    // The reference line of e6mini.xodr bends to the right, and then is straight.
+    let points = alignment_of(&output);
+    assert!(within_m < 0.05 && points.len() > 10, "{within_m} {points:?}");
+    assert!(points.iter().all(|[_, curvature_per_m]| (-0.000_5..0.000_1).contains(curvature_per_m)), "{points:?}");
 }

@@ -23,13 +23,19 @@ const NEAR: &str = "actor.rear.start.behind.gap-m=45";
 const SAMPLE: [&str; 6] = ["--seed", "3", "--sample", "2", "--set", NEAR];
 
 /// Scenarios whose tracks must come out again: what is added to the headline, and the options of both commands.
-const ROUND_TRIPS: [(&str, &str); 3] = [
+const ROUND_TRIPS: [(&str, &str); 4] = [
     ("", "scans.parquet"),
     // A bend, guard rails, and a slower LiDAR at a corner beside one that looks ahead, whose scans are left out.
     (
         "road.curvature-per-m = 0.001\nroad.guard-rails = true\n\
          [[sensors.additional-rear-lidars]]\nname = \"left\"\nmodel = \"pandar-xt-16\"\nleft-m = 0.8\nazimuth-deg = 45\n\
          [sensors.front-lidar]\nmodel = \"scala-2\"\n",
+        "scans.parquet",
+    ),
+    // A clothoid to the left and one to the right.
+    (
+        "road.guard-rails = true\nroad.alignment = [{ s-m = 0.0, curvature-per-m = 0.001 }, \
+         { s-m = 1000.0, curvature-per-m = -0.001 }]\n",
         "scans.parquet",
     ),
     ("environment.visibility-m = 150\nsensors.tracker.latency-s = 0.12\n", "scans.pcd"),

@@ -11,8 +11,12 @@
 //! The code writes 1 − cos Δ as 2·sin²(Δ/2), which loses no digits if κ is small. Every position is
 //! formed relative to the ego, so a run at s = 100 km is as exact as one at s = 0. A rotation by
 //! the ego's heading relative to the road turns (a, b) into (x, y).
+//!
+//! On a road with an alignment, (a, b) is the integral of the road's direction from the ego to the
+//! point, and the inverse is a Newton iteration ([`crate::Alignment`]).
 
 use crate::maths::erfc;
+use crate::road::Course;
 use crate::{Lane, Road, Side, VehicleState, maths};
 
 /// Number of standard deviations from a lane's edge beyond which a vehicle is certainly on one side
@@ -51,15 +55,21 @@ impl<'a> EgoFrame<'a> {
 
     /// Transforms the road point (s, d) into the ego's frame.
     pub fn point(&self, s_m: f64, d_m: f64) -> RoadPoint {
-        let curvature = self.road.curvature_per_m();
         let (mut along_m, mut across_m) = (s_m - self.s_m, d_m - self.d_m);
         let mut turn_rad = 0.0;
-        if curvature != 0.0 {
-            turn_rad = curvature * along_m;
-            let radius_m = 1.0 / curvature - d_m;
-            let half_sin = maths::sin(0.5 * turn_rad);
-            along_m = radius_m * maths::sin(turn_rad);
-            across_m += radius_m * 2.0 * half_sin * half_sin;
+        match self.road.course() {
+            Course::Constant(0.0) => {}
+            Course::Constant(curvature) => {
+                turn_rad = curvature * along_m;
+                let radius_m = 1.0 / curvature - d_m;
+                let half_sin = maths::sin(0.5 * turn_rad);
+                along_m = radius_m * maths::sin(turn_rad);
+                across_m += radius_m * 2.0 * half_sin * half_sin;
+            }
+            Course::Varying(course) => {
+                let way = course.way([self.s_m, self.d_m], [s_m, d_m]);
+                (along_m, across_m, turn_rad) = (way.along_m, way.across_m, way.turn_rad);
+            }
         }
         RoadPoint {
             x_m: along_m * self.cos + across_m * self.sin,
@@ -72,27 +82,32 @@ impl<'a> EgoFrame<'a> {
     pub fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
-        let curvature = self.road.curvature_per_m();
-        let arc_length_m = match curvature {
-            0.0 => along_m,
-            _ => maths::atan2(curvature * along_m, 1.0 - curvature * (self.d_m + across_m)) / curvature,
+        let arc_length_m = match self.road.course() {
+            Course::Constant(0.0) => along_m,
+            Course::Constant(curvature) => {
+                maths::atan2(curvature * along_m, 1.0 - curvature * (self.d_m + across_m)) / curvature
+            }
+            Course::Varying(course) => {
+                let [s_m, d_m] = course.position_m([self.s_m, self.d_m], [along_m, across_m], self.s_m + along_m);
+                return (s_m, d_m);
+            }
         };
         (self.s_m + arc_length_m, self.lateral_position_m(x_m, y_m))
     }
 
-    /// Returns the length of path that a vehicle at `d_m` covers per metre of the reference line
-    /// (m/m).
-    pub fn path_scale(&self, d_m: f64) -> f64 {
-        1.0 - self.road.curvature_per_m() * d_m
+    /// Returns the length of path that a vehicle at (`s_m`, `d_m`) covers per metre of the reference
+    /// line (m/m).
+    pub fn path_scale(&self, s_m: f64, d_m: f64) -> f64 {
+        self.road.path_scale(s_m, d_m)
     }
 
     /// Returns the lateral road coordinate d (m) of a point in the ego's frame.
     ///
     /// The ego knows it from its lane camera and its map.
     fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
+        let Course::Constant(curvature) = *self.road.course() else { return self.road_position_m(x_m, y_m).1 };
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
-        let curvature = self.road.curvature_per_m();
         // The line through the ego parallel to the road's edge has this curvature. The quotient
         // below is the exact lateral offset from a circle, and equals `across_m` for a straight
         // line.

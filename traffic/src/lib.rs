@@ -102,7 +102,10 @@ pub use optics::{KOSCHMIEDER, rain_db_per_km};
 pub use parameters::{Parameters, Value, readable};
 pub use quintic::{MINIMUM_JERK_PEAK, Quintic, minimum_jerk};
 pub use random::{Exp1, StandardNormal};
-pub use road::{Lane, NoLaneBeside, PlanePose, Road, RoadConfig, Side};
+pub use road::{
+    Alignment, AlignmentPiece, AlignmentPoint, AlignmentPointConfig, Lane, NoLaneBeside, PlanePose, Road, RoadConfig,
+    Side,
+};
 pub use roadside::{Roadside, RoadsideConfig};
 pub use scene::{Scene, SceneVehicle};
 pub use seed::{Stream, stream};

@@ -1,4 +1,4 @@
-//! A straight or gently curved road of parallel lanes.
+//! A road of parallel lanes: straight, of one curvature, or with an alignment.
 //!
 //! ```text
 //!        d = 0 ─────────────────────────────  left edge of the leftmost lane
@@ -8,8 +8,8 @@
 //!              ─────────────────────────────  right edge at d = −n·w
 //! ```
 //!
-//! The reference line is d = 0: an arc of constant curvature, positive if the road bends to the
-//! left.
+//! The reference line is d = 0. Its curvature is positive if the road bends to the left. It is
+//! constant, or follows an [`Alignment`] of lines, arcs and clothoids.
 //!
 //! One lane may be an acceleration lane: see [`AccelerationLane`].
 
@@ -17,6 +17,12 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+mod alignment;
+mod course;
+
+pub use alignment::{Alignment, AlignmentPiece, AlignmentPoint, AlignmentPointConfig};
+pub(crate) use course::{Course, OffsetLine};
 
 use crate::acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
@@ -96,6 +102,11 @@ pub struct RoadConfig {
     /// Curvature of the left edge (1/m), positive if the road bends to the left.
     #[serde(default = "default_curvature")]
     pub curvature_per_m: Num,
+    /// The points between which the curvature changes linearly, 2 to 32 instead of `curvature-per-m`:
+    /// lines, arcs and clothoids. The positions increase by 1 m or more; a position that occurs twice
+    /// is a jump. Default: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alignment: Vec<AlignmentPointConfig>,
     /// Speed limit (m/s).
     #[serde(default = "default_speed_limit")]
     pub speed_limit_mps: Num,
@@ -132,7 +143,7 @@ fn default_overtaking_side() -> Side {
 pub struct Road {
     lanes: u8,
     lane_width_m: f64,
-    curvature_per_m: f64,
+    course: Course,
     speed_limit_mps: f64,
     overtaking_side: Side,
     guard_rails: bool,
@@ -156,10 +167,19 @@ impl Check for RoadConfig {
             return Err(ConfigError::new("acceleration-lane", Problem::Contradiction { other: "lanes", rule }));
         }
         let number = |num, key, range| parameters.number(num, key, range);
+        let curvature_per_m = number(&self.curvature_per_m, "curvature-per-m", Road::CURVATURE_PER_M)?;
+        let course = match self.alignment.is_empty() {
+            true => Course::Constant(curvature_per_m),
+            false if self.curvature_per_m != default_curvature() => {
+                let rule = "the curvature is constant, or has points between which it changes: one of both".to_owned();
+                return Err(ConfigError::new("curvature-per-m", Problem::Contradiction { other: "alignment", rule }));
+            }
+            false => Course::Varying(OffsetLine { line: alignment::check(&self.alignment, parameters)?, d_m: 0.0 }),
+        };
         Ok(Road {
             lanes: self.lanes,
             lane_width_m: number(&self.lane_width_m, "lane-width-m", Road::LANE_WIDTH_M)?,
-            curvature_per_m: number(&self.curvature_per_m, "curvature-per-m", Road::CURVATURE_PER_M)?,
+            course,
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
             guard_rails: self.guard_rails,
@@ -188,7 +208,7 @@ impl Road {
         Self {
             lanes: lanes.clamp(1, 8),
             lane_width_m: 3.75,
-            curvature_per_m: 0.0,
+            course: Course::Constant(0.0),
             speed_limit_mps: 36.1,
             overtaking_side: Side::Left,
             guard_rails: false,
@@ -198,10 +218,29 @@ impl Road {
         }
     }
 
-    /// Returns the same road with another curvature (1/m), clamped to ±0.0025.
+    /// Returns the same road with one curvature everywhere (1/m), clamped to ±0.0025.
     #[must_use]
     pub fn with_curvature(self, curvature_per_m: f64) -> Self {
-        Self { curvature_per_m: curvature_per_m.clamp(-0.0025, 0.0025), ..self }
+        Self { course: Course::Constant(curvature_per_m.clamp(-0.0025, 0.0025)), ..self }
+    }
+
+    /// Returns the same road with this alignment of its left edge.
+    #[must_use]
+    pub fn with_alignment(self, line: Alignment) -> Self {
+        Self { course: Course::Varying(OffsetLine { line, d_m: 0.0 }), ..self }
+    }
+
+    /// Returns the same road with another curvature by `added_per_m` (1/m) at each position. The
+    /// results are clamped to ±0.0025.
+    #[must_use]
+    pub fn with_added_curvature(self, added_per_m: f64) -> Self {
+        match self.course {
+            Course::Constant(curvature_per_m) => self.with_curvature(curvature_per_m + added_per_m),
+            Course::Varying(OffsetLine { line, d_m }) => {
+                let line = line.bent(|curvature_per_m| (curvature_per_m + added_per_m).clamp(-0.0025, 0.0025));
+                Self { course: Course::Varying(OffsetLine { line, d_m }), ..self }
+            }
+        }
     }
 
     /// Returns the same road with lanes of another width (m), clamped to 2.5 to 5 m.
@@ -222,7 +261,7 @@ impl Road {
     /// are measured along its left edge, which is the right edge of the mirror image.
     pub fn mirrored(self) -> Option<Self> {
         let overtaking_side = self.overtaking_side.opposite();
-        (self.curvature_per_m == 0.0).then_some(Self { overtaking_side, ..self })
+        self.is_straight().then_some(Self { overtaking_side, ..self })
     }
 
     /// Returns the same road in the opposite direction: s runs against the traffic, and d = 0 is
@@ -231,18 +270,27 @@ impl Road {
     pub fn reversed(self) -> Self {
         // The original's right edge has another curvature than its left edge. Passed the other way,
         // it bends to the other side.
-        let curvature_per_m = -self.curvature_per_m / (1.0 - self.curvature_per_m * self.right_edge_m());
+        let course = match self.course {
+            Course::Constant(curvature) => Course::Constant(-curvature / (1.0 - curvature * self.right_edge_m())),
+            Course::Varying(OffsetLine { line, d_m }) => {
+                Course::Varying(OffsetLine { line: line.reversed(), d_m: self.right_edge_m() - d_m })
+            }
+        };
         let overtaking_side = self.overtaking_side.opposite();
         let acceleration_lane =
             self.acceleration_lane.map(|lane| lane.moved(|s_m| self.reversed_position_m(s_m, 0.0).0));
-        Self { curvature_per_m, overtaking_side, acceleration_lane, is_reversed: !self.is_reversed, ..self }
+        Self { course, overtaking_side, acceleration_lane, is_reversed: !self.is_reversed, ..self }
     }
 
     /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point
     /// (`s_m`, `d_m`) of this road.
     pub fn reversed_position_m(&self, s_m: f64, d_m: f64) -> (f64, f64) {
         let right_edge_m = self.right_edge_m();
-        (-s_m * (1.0 - self.curvature_per_m * right_edge_m), right_edge_m - d_m)
+        let scale = match self.course {
+            Course::Constant(curvature_per_m) => 1.0 - curvature_per_m * right_edge_m,
+            Course::Varying(_) => 1.0,
+        };
+        (-s_m * scale, right_edge_m - d_m)
     }
 
     /// Returns true if the road runs against the traffic.
@@ -269,9 +317,81 @@ impl Road {
         self.lane_width_m
     }
 
-    /// Returns the curvature of the left edge (1/m), positive if the road bends to the left.
-    pub fn curvature_per_m(&self) -> f64 {
-        self.curvature_per_m
+    /// Returns true if the road is straight everywhere, as a road without curvature and without an
+    /// alignment is.
+    pub fn is_straight(&self) -> bool {
+        self.course == Course::Constant(0.0)
+    }
+
+    /// Returns the curvature of the line along which s is measured, the left edge, at `s_m` (1/m):
+    /// positive if the road bends to the left. On a [`reversed`](Self::reversed) road with an
+    /// alignment, this line is the right edge.
+    pub fn curvature_at_per_m(&self, s_m: f64) -> f64 {
+        match &self.course {
+            Course::Constant(curvature_per_m) => *curvature_per_m,
+            Course::Varying(course) => course.line.curvature_at_per_m(s_m),
+        }
+    }
+
+    /// Returns the curvature if it is the same everywhere (1/m), or `None` on a road with an alignment.
+    pub fn constant_curvature_per_m(&self) -> Option<f64> {
+        match self.course {
+            Course::Constant(curvature_per_m) => Some(curvature_per_m),
+            Course::Varying(_) => None,
+        }
+    }
+
+    /// Returns the smallest and the largest curvature (1/m).
+    pub fn curvature_range_per_m(&self) -> [f64; 2] {
+        match &self.course {
+            Course::Constant(curvature_per_m) => [*curvature_per_m; 2],
+            Course::Varying(course) => course.line.curvature_range_per_m(),
+        }
+    }
+
+    /// Returns the alignment, or `None` on a road of one curvature.
+    pub fn alignment(&self) -> Option<&Alignment> {
+        self.varying().map(|course| &course.line)
+    }
+
+    pub(crate) fn course(&self) -> &Course {
+        &self.course
+    }
+
+    fn varying(&self) -> Option<&OffsetLine> {
+        match &self.course {
+            Course::Constant(_) => None,
+            Course::Varying(course) => Some(course),
+        }
+    }
+
+    /// Returns the length of the path that a vehicle at (`s_m`, `d_m`) covers per metre of s (m/m):
+    /// below 1 on the inside of a bend.
+    pub fn path_scale(&self, s_m: f64, d_m: f64) -> f64 {
+        match &self.course {
+            Course::Constant(curvature_per_m) => 1.0 - curvature_per_m * d_m,
+            Course::Varying(course) => course.path_scale(s_m, d_m),
+        }
+    }
+
+    /// Returns the curvature (1/m) at `s_m` of the line that runs at `d_m` along the road.
+    pub fn parallel_curvature_per_m(&self, s_m: f64, d_m: f64) -> f64 {
+        self.curvature_at_per_m(s_m) / self.path_scale(s_m, d_m)
+    }
+
+    /// Returns the length of the path at `d_m` between two positions along the road (m); negative if
+    /// the second one is behind the first one.
+    pub fn path_length_m(&self, [from_m, to_m]: [f64; 2], d_m: f64) -> f64 {
+        match &self.course {
+            Course::Constant(curvature_per_m) => (to_m - from_m) * (1.0 - curvature_per_m * d_m),
+            Course::Varying(course) => (to_m - from_m) - (d_m - course.d_m) * course.line.turn_rad(from_m, to_m),
+        }
+    }
+
+    /// Returns the position along the road (m) after a short path at `d_m`. The scale of the path is
+    /// the one in its middle, so that the error is of third order in its length.
+    pub fn advanced_m(&self, s_m: f64, d_m: f64, path_m: f64) -> f64 {
+        s_m + path_m / self.path_scale(s_m + 0.5 * path_m, d_m)
     }
 
     /// Returns the speed limit (m/s).
@@ -375,7 +495,13 @@ impl Road {
     /// Returns the pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the
     /// road.
     pub fn plane_pose(&self, s_m: f64, d_m: f64, heading_rad: f64) -> PlanePose {
-        let curvature = self.curvature_per_m;
+        let curvature = match &self.course {
+            Course::Constant(curvature_per_m) => *curvature_per_m,
+            Course::Varying(course) => {
+                let pose = course.pose(s_m, d_m);
+                return PlanePose { yaw_rad: pose.yaw_rad + heading_rad, ..pose };
+            }
+        };
         if curvature == 0.0 {
             return PlanePose { x_m: s_m, y_m: d_m, yaw_rad: heading_rad };
         }
@@ -388,10 +514,21 @@ impl Road {
         }
     }
 
-    /// Returns the road coordinates s and d (m) of a point in the plane; unique within half a turn
-    /// of s = 0.
-    pub fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
-        let curvature = self.curvature_per_m;
+    /// Returns the road coordinates s and d (m) of a point in the plane. They are unique within half
+    /// a turn of s = 0. On a road with an alignment, the search begins at `near_m`, from where the
+    /// road turns by less than a right angle.
+    pub fn road_position_m(&self, x_m: f64, y_m: f64, near_m: f64) -> (f64, f64) {
+        let curvature = match &self.course {
+            Course::Constant(curvature_per_m) => *curvature_per_m,
+            Course::Varying(course) => {
+                let near = course.pose(near_m, 0.0);
+                let (sin, cos) = maths::sin_cos(near.yaw_rad);
+                let (to_x, to_y) = (x_m - near.x_m, y_m - near.y_m);
+                let way_m = [to_x * cos + to_y * sin, to_y * cos - to_x * sin];
+                let [s_m, d_m] = course.position_m([near_m, 0.0], way_m, near_m);
+                return (s_m, d_m);
+            }
+        };
         if curvature == 0.0 {
             return (x_m, y_m);
         }
@@ -468,6 +605,7 @@ mod tests {
                 lanes,
                 lane_width_m: default_lane_width(),
                 curvature_per_m: default_curvature(),
+                alignment: Vec::new(),
                 speed_limit_mps: default_speed_limit(),
                 overtaking_side: Side::Left,
                 guard_rails: false,
@@ -486,12 +624,55 @@ mod tests {
         assert_eq!(check(3, f64::NAN).unwrap_err(), "acceleration-lane.length-m");
     }
 
+    #[test]
+    fn the_curvature_of_a_road_is_one_number_or_an_alignment() {
+        let check = |curvature_per_m: f64, points: &[[f64; 2]]| {
+            let point = |&[s_m, curvature_per_m]: &[f64; 2]| AlignmentPointConfig {
+                s_m: s_m.into(),
+                curvature_per_m: curvature_per_m.into(),
+            };
+            let config = RoadConfig {
+                lanes: 3,
+                lane_width_m: default_lane_width(),
+                curvature_per_m: curvature_per_m.into(),
+                alignment: points.iter().map(point).collect(),
+                speed_limit_mps: default_speed_limit(),
+                overtaking_side: Side::Left,
+                guard_rails: false,
+                roadside: RoadsideConfig::default(),
+                acceleration_lane: None,
+            };
+            config.check(&Parameters::default()).map_err(|error| error.to_string())
+        };
+        let points = [[0.0, 0.0], [100.0, 0.002]];
+        let road = check(0.0, &points).unwrap();
+        assert_eq!(road.alignment().unwrap().points().len(), 2);
+        assert_eq!([50.0, 500.0].map(|s_m| road.curvature_at_per_m(s_m)), [0.001, 0.002]);
+        let both = check(0.001, &points).unwrap_err();
+        assert!(both.starts_with("`curvature-per-m` contradicts `alignment`"), "{both}");
+        let tight = check(0.0, &[[0.0, 0.0], [100.0, 0.003]]).unwrap_err();
+        assert!(tight.starts_with("`alignment[1].curvature-per-m` is 0.003"), "{tight}");
+        let one = check(0.0, &points[..1]).unwrap_err();
+        assert!(one.starts_with("`alignment` is 1"), "{one}");
+    }
+
+    #[test]
+    fn an_error_of_the_map_bends_each_place_of_an_alignment() {
+        let points = [[0.0, 0.0], [100.0, 0.002]];
+        let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+        let map = Road::straight(3).with_alignment(Alignment::new(&points).unwrap()).with_added_curvature(0.000_4);
+        for (s_m, expected) in [(-50.0, 0.0004), (50.0, 0.0014), (200.0, 0.0024)] {
+            assert!((map.curvature_at_per_m(s_m) - expected).abs() < 1e-12);
+        }
+        assert_eq!(Road::straight(3).with_added_curvature(0.001), Road::straight(3).with_curvature(0.001));
+    }
+
     proptest! {
         #[test]
         fn road_and_plane_are_inverse(s in -500.0..500.0, d in -12.0..2.0, curvature in -0.0025..0.0025) {
             let road = Road::straight(3).with_curvature(curvature);
             let pose = road.plane_pose(s, d, 0.0);
-            let (back_s, back_d) = road.road_position_m(pose.x_m, pose.y_m);
+            let (back_s, back_d) = road.road_position_m(pose.x_m, pose.y_m, 0.0);
             prop_assert!((back_s - s).abs() < 1e-6, "{back_s} {s}");
             prop_assert!((back_d - d).abs() < 1e-6, "{back_d} {d}");
         }

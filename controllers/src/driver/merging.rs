@@ -210,7 +210,7 @@ impl<D: Driver> Driver for MergingDriver<D> {
 
 /// Returns the distance from the front bumper to the end of the lane's full width (m).
 fn rest_m(lane: &AccelerationLane, input: &DriverInput<'_>) -> f64 {
-    let along_m = (lane.to_m - input.own.s_m) * (1.0 - input.road.curvature_per_m() * input.own.d_m);
+    let along_m = input.road.path_length_m([input.own.s_m, lane.to_m], input.own.d_m);
     along_m - 0.5 * input.vehicle.dimensions.length_m
 }
 

@@ -52,6 +52,8 @@ pub struct EgoInput<'a> {
     pub odometry: Odometry,
     /// The road, as a map describes it.
     pub road: &'a Road,
+    /// Curvature of the road at the ego (1/m), as the map describes it; positive to the left.
+    pub curvature_per_m: f64,
     /// All tracks that the sensors report, including tentative ones.
     pub tracks: &'a [Track],
     /// The groups of sensors that work.

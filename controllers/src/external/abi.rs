@@ -25,7 +25,7 @@ pub struct SetupView {
     pub control_step_s: f64,
     /// Width of a lane (m).
     pub lane_width_m: f64,
-    /// Curvature of the road (1/m), positive to the left.
+    /// Curvature of the road (1/m), positive to the left; NaN if it changes along the road.
     pub curvature_per_m: f64,
     /// Speed limit (m/s).
     pub speed_limit_mps: f64,

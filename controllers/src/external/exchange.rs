@@ -16,7 +16,7 @@ pub struct Setup {
     pub control_step_s: f64,
     /// Width of a lane (m).
     pub lane_width_m: f64,
-    /// Curvature of the road (1/m), positive to the left.
+    /// Curvature of the road (1/m), positive to the left; NaN if it changes along the road.
     pub curvature_per_m: f64,
     /// Speed limit (m/s).
     pub speed_limit_mps: f64,
@@ -39,7 +39,7 @@ impl Setup {
     pub(crate) fn on_road(settings: &Value, road: RoadMessage) -> Self {
         Self {
             lane_width_m: road.lane_width_m,
-            curvature_per_m: road.curvature_per_m,
+            curvature_per_m: road.curvature_per_m.unwrap_or(f64::NAN),
             speed_limit_mps: road.speed_limit_mps,
             lanes: road.lanes.into(),
             overtaking_side: road.overtaking_side,

@@ -14,8 +14,8 @@ pub struct RoadMessage {
     pub lanes: u8,
     /// Width of a lane (m).
     pub lane_width_m: f64,
-    /// Curvature (1/m), positive to the left.
-    pub curvature_per_m: f64,
+    /// Curvature (1/m), positive to the left; `None` if it changes along the road.
+    pub curvature_per_m: Option<f64>,
     /// Speed limit (m/s).
     pub speed_limit_mps: f64,
     /// The side on which others are overtaken.
@@ -28,7 +28,7 @@ impl RoadMessage {
         Self {
             lanes: road.lanes(),
             lane_width_m: road.lane_width_m(),
-            curvature_per_m: road.curvature_per_m(),
+            curvature_per_m: road.constant_curvature_per_m(),
             speed_limit_mps: road.speed_limit_mps(),
             overtaking_side: road.overtaking_side(),
         }

@@ -178,6 +178,7 @@ pub(crate) struct ControllerInput {
     front: Option<Front>,
     sensors: SensorAvailability,
     road: Road,
+    curvature_per_m: f64,
     measured: closecall_controllers::Odometry,
     tracks: Vec<closecall_traffic::Track>,
     /// The tracks as Python objects, as soon as they are asked for.
@@ -202,6 +203,7 @@ impl ControllerInput {
             front,
             sensors: input.sensors,
             road: *input.road,
+            curvature_per_m: input.curvature_per_m,
             measured: *own,
             tracks: input.tracks.to_vec(),
             objects: PyOnceLock::new(),
@@ -233,6 +235,7 @@ impl ControllerInput {
             time: Time::from_ns(self.time_ns),
             odometry: self.measured,
             road: &self.road,
+            curvature_per_m: self.curvature_per_m,
             tracks: &self.tracks,
             sensors: self.sensors,
         };

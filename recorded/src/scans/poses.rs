@@ -180,7 +180,7 @@ impl Poses {
         // The curvature of a road is the curvature of its left edge, where d is 0.
         let road = road.with_curvature(path_per_m / (1.0 + path_per_m * d_m));
         // A metre of the left edge is longer or shorter than a metre of the ego's path.
-        let s_m = mixed(&|index| self.driven_m[index]) / (1.0 - road.curvature_per_m() * d_m);
+        let s_m = mixed(&|index| self.driven_m[index]) / road.path_scale(0.0, d_m);
         Ok((road, VehicleState { s_m, d_m, ..state }))
     }
 
@@ -223,11 +223,15 @@ mod tests {
     fn the_road_of_an_ego_without_a_map_is_the_arc_that_it_has_driven() {
         let (road, ego) = bend().place_at(Time::from_ms(5_050), &Road::straight(3), -5.625).unwrap();
         // The left edge of the road is 5.6 m nearer to the centre of the bend.
-        assert!((1.0 / road.curvature_per_m() - (1_000.0 - 5.625)).abs() < 0.1, "{}", road.curvature_per_m());
+        assert!(
+            (1.0 / road.curvature_at_per_m(0.0) - (1_000.0 - 5.625)).abs() < 0.1,
+            "{}",
+            road.curvature_at_per_m(0.0)
+        );
         assert_eq!((ego.heading_rad, ego.d_m, ego.speed_mps), (0.0, -5.625, 30.0));
         assert!((ego.yaw_rate_radps - 0.03).abs() < 1e-9);
         let (_, later) = bend().place_at(Time::from_ms(6_050), &Road::straight(3), -5.625).unwrap();
-        let driven_m = (later.s_m - ego.s_m) * (1.0 + 5.625 * road.curvature_per_m());
+        let driven_m = (later.s_m - ego.s_m) * (1.0 + 5.625 * road.curvature_at_per_m(0.0));
         assert!((driven_m - 30.0).abs() < 0.01, "{driven_m}");
     }
 

@@ -10,7 +10,7 @@
 //! traffic overtakes on the right, the acceleration lane is lane −1; the file has its full width
 //! everywhere.
 
-use closecall_traffic::{AccelerationLane, Lane, Road, Side};
+use closecall_traffic::{AccelerationLane, AlignmentPiece, Lane, Road, Side};
 
 use super::element::Element;
 use crate::date::today;
@@ -59,19 +59,6 @@ impl<'a> UsedRoad<'a> {
     }
 
     fn element(&self, name: &str) -> Element {
-        let start = self.road.plane_pose(self.start_m, 0.0, 0.0);
-        let curvature = self.road.curvature_per_m();
-        let shape = match curvature == 0.0 {
-            true => Element::new("line"),
-            false => Element::new("arc").with("curvature", curvature),
-        };
-        let geometry = Element::new("geometry")
-            .with("s", 0)
-            .with("x", start.x_m)
-            .with("y", start.y_m)
-            .with("hdg", start.yaw_rad)
-            .with("length", self.length_m)
-            .child(shape);
         let speed = Element::new("speed").with("max", self.road.speed_limit_mps()).with("unit", "m/s");
         let sections = self.sections();
         let mut lanes = Element::new("lanes");
@@ -86,8 +73,37 @@ impl<'a> UsedRoad<'a> {
             .with("junction", -1)
             .with("rule", "RHT")
             .child(Element::new("type").with("s", 0).with("type", "motorway").child(speed))
-            .child(geometry.within("planView"))
+            .child(Element::new("planView").children(self.geometries()))
             .child(lanes)
+    }
+
+    /// Returns the pieces of the reference line: lines, arcs and spirals.
+    fn geometries(&self) -> Vec<Element> {
+        let [from_m, to_m] = self.range_m();
+        let pieces: Vec<AlignmentPiece> = match self.road.alignment() {
+            Some(alignment) => alignment.pieces(from_m, to_m).collect(),
+            None => {
+                let curvatures_per_m = [self.road.curvature_at_per_m(from_m); 2];
+                vec![AlignmentPiece { start_m: from_m, length_m: self.length_m, curvatures_per_m }]
+            }
+        };
+        let geometry = |piece: &AlignmentPiece| {
+            let start = self.road.plane_pose(piece.start_m, 0.0, 0.0);
+            let [from, to] = piece.curvatures_per_m;
+            let shape = match (from == to, from == 0.0) {
+                (true, true) => Element::new("line"),
+                (true, false) => Element::new("arc").with("curvature", from),
+                (false, _) => Element::new("spiral").with("curvStart", from).with("curvEnd", to),
+            };
+            Element::new("geometry")
+                .with("s", piece.start_m - from_m)
+                .with("x", start.x_m)
+                .with("y", start.y_m)
+                .with("hdg", start.yaw_rad)
+                .with("length", piece.length_m)
+                .child(shape)
+        };
+        pieces.iter().map(geometry).collect()
     }
 
     /// Returns the acceleration lane, if it is the rightmost lane.
@@ -191,6 +207,8 @@ fn marking(kind: &str, from_m: f64) -> Element {
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::{Alignment, AlignmentPoint};
+
     use super::*;
 
     const ENTRY: AccelerationLane = AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };
@@ -220,6 +238,29 @@ mod tests {
         // The marking is broken from the end of the ramp on, 600 m behind the start of the file's road.
         let first = text.split("<laneSection").nth(1).unwrap();
         assert_eq!(count(first, "sOffset=\"600\" type=\"broken\""), 1, "{first}");
+    }
+
+    #[test]
+    fn the_pieces_of_an_alignment_are_lines_arcs_and_spirals_that_follow_each_other() {
+        let points = [[0.0, 0.0], [100.0, 0.002], [250.0, 0.002], [250.0, 0.0], [350.0, -0.001]];
+        let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+        let road = Road::straight(2).with_alignment(Alignment::new(&points).unwrap());
+        let text = document(&road, 400.0);
+        let shapes: Vec<&str> = text.split("<geometry ").skip(1).map(|part| part.split('<').nth(1).unwrap()).collect();
+        let names: Vec<&str> = shapes.iter().map(|shape| shape.split([' ', '/']).next().unwrap()).collect();
+        assert_eq!(names, ["line", "spiral", "arc", "spiral", "arc"]);
+        assert!(shapes[1].contains("curvStart=\"0\" curvEnd=\"0.002\""), "{}", shapes[1]);
+        assert!(shapes[3].contains("curvStart=\"0\" curvEnd=\"-0.001\""), "{}", shapes[3]);
+        for (start, length) in [("0", "500"), ("500", "100"), ("600", "150"), ("750", "100"), ("850", "550")] {
+            let piece = text.split("<geometry ").find(|part| part.starts_with(&format!("s=\"{start}\" "))).unwrap();
+            assert!(piece.contains(&format!("length=\"{length}\"")), "{piece}");
+            let pose = road.plane_pose(start.parse::<f64>().unwrap() - 500.0, 0.0, 0.0);
+            for (key, value) in [("x", pose.x_m), ("y", pose.y_m), ("hdg", pose.yaw_rad)] {
+                assert!(piece.contains(&format!("{key}=\"{value}\"")), "{key} {value}: {piece}");
+            }
+        }
+        // A part within one piece is one piece.
+        assert_eq!(count(&UsedRoad::new(&road, [2_000.0].into_iter()).document("road"), "<geometry"), 1);
     }
 
     #[test]

@@ -78,7 +78,7 @@ impl OddAttribute {
             },
             Self::Particulates => second(environment.visibility_m < FOG_VISIBILITY_M),
             Self::SurfaceCondition => second(environment.water_film_mm > 0.0),
-            Self::HorizontalPlane => second(road.curvature_per_m() != 0.0),
+            Self::HorizontalPlane => second(!road.is_straight()),
             Self::DrivableAreaEdge => second(road.has_guard_rails()),
         }
     }

@@ -12,6 +12,7 @@
 //! element, or a note; nothing is left out in silence.
 
 mod condition;
+mod course;
 mod distribution;
 mod dom;
 mod entities;
@@ -39,7 +40,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::words::counted;
-use closecall_traffic::{Environment, Segment, input};
+use closecall_traffic::{AlignmentPoint, Environment, Segment, input};
 
 pub use dom::ImportError;
 
@@ -608,14 +609,23 @@ fn scenario_text(
     for note in &played.notes {
         let _ = writeln!(text, "#   {}", plain(note));
     }
+    let course = match &road.alignment {
+        None => format!("curvature-per-m = {:?}", road.curvature_per_m),
+        Some(alignment) => {
+            let point = |point: &AlignmentPoint| {
+                format!("{{ s-m = {:?}, curvature-per-m = {:?} }}", point.s_m, point.curvature_per_m)
+            };
+            let points: Vec<String> = alignment.points().iter().map(point).collect();
+            format!("alignment = [{}]", points.join(", "))
+        }
+    };
     let _ = write!(
         text,
         "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
-         road = {{ lanes = {}, lane-width-m = {:?}, curvature-per-m = {:?}{}{}{} }}\n",
+         road = {{ lanes = {}, lane-width-m = {:?}, {course}{}{}{} }}\n",
         kebab(&stem),
         road.lanes.len(),
         road.lane_width_m,
-        road.curvature_per_m,
         limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),
         if road.is_left_hand { ", overtaking-side = \"right\"" } else { "" },
         acceleration_lane.unwrap_or_default(),

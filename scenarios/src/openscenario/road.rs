@@ -4,8 +4,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use closecall_traffic::{AccelerationLane, Road};
+use closecall_traffic::{AccelerationLane, Alignment, Road};
 
+use super::course;
 use super::dom::{ImportError, Node, parse};
 use super::entry_lane;
 use super::plane::ReferenceLine;
@@ -37,8 +38,10 @@ pub(super) struct ImportedRoad {
     pub(super) centres_m: Vec<f64>,
     pub(super) lane_width_m: f64,
     pub(super) curvature_per_m: f64,
+    /// The course of a road whose curvature changes.
+    pub(super) alignment: Option<Alignment>,
     pub(super) acceleration_lane: Option<AccelerationLane>,
-    /// The reference line, or `None` if it is neither one line nor one arc.
+    /// The reference line, or `None` if the road has another course than its reference line.
     pub(super) line: Option<ReferenceLine>,
     pub(super) speed_limit_mps: Option<f64>,
     /// The properties that the scenario's road lacks.
@@ -156,7 +159,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     if driving.iter().any(|(_, width)| *width != lane_width_m) {
         notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
     }
-    let curvature_per_m = curvature(path, road, &mut notes)?;
+    let (curvature_per_m, alignment) = curvature(path, road, &mut notes)?;
     let speed_limit_mps = road.at(&["type", "speed"]).map(|speed| speed_limit(path, speed)).transpose()?.flatten();
     let mut centres_m = centres_m(lanes, along, &driving);
     if let (Some(entry), Some(width_m)) = (first_entry, last_width_m) {
@@ -168,7 +171,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         }
     }
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
-    let line = reference_line(path, road, curvature_per_m);
+    let line = reference_line(path, (road, length_m), curvature_per_m, alignment);
     let id = road_id.to_owned();
     Ok(ImportedRoad {
         id,
@@ -178,6 +181,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         centres_m,
         lane_width_m,
         curvature_per_m,
+        alignment,
         acceleration_lane: entry.map(|entry| entry.positions),
         line,
         speed_limit_mps,
@@ -209,12 +213,18 @@ fn centres_m(lanes: &Node, along: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
     centres_m.into_iter().map(|(_, centre_m)| centre_m).collect()
 }
 
-/// Returns the reference line of a road in the plane, or `None` if it is neither one line nor one
-/// arc, or the file does not say where it begins.
-fn reference_line(path: &Path, road: &Node, curvature_per_m: f64) -> Option<ReferenceLine> {
+/// Returns the reference line of a road of a length (m) in the plane, or `None` if it is not the course
+/// of the imported road, or the file does not say where it begins.
+fn reference_line(
+    path: &Path,
+    (road, length_m): (&Node, f64),
+    curvature_per_m: f64,
+    alignment: Option<Alignment>,
+) -> Option<ReferenceLine> {
     let geometries: Vec<&Node> = road.child("planView")?.all("geometry").collect();
     let first = geometries.first()?;
-    let is_one = match first.children.first()?.name.as_str() {
+    let is_followed = match first.children.first()?.name.as_str() {
+        _ if alignment.is_some() => true,
         "arc" => geometries.len() == 1 && curvature_per_m != 0.0,
         "line" => geometries.iter().all(|geometry| {
             let is_line = geometry.children.first().is_some_and(|shape| shape.name == "line");
@@ -223,12 +233,15 @@ fn reference_line(path: &Path, road: &Node, curvature_per_m: f64) -> Option<Refe
         _ => false,
     };
     let value = |name| number(path, first, name).ok();
-    is_one.then_some(ReferenceLine { x_m: value("x")?, y_m: value("y")?, heading_rad: value("hdg")?, curvature_per_m })
+    let straight = Road::straight(1);
+    let course = alignment.map_or(straight.with_curvature(curvature_per_m), |line| straight.with_alignment(line));
+    let (x_m, y_m, heading_rad) = (value("x")?, value("y")?, value("hdg")?);
+    is_followed.then_some(ReferenceLine { x_m, y_m, heading_rad, length_m, course })
 }
 
-/// Returns the curvature of a road that is one line or one arc. For any other road, returns the
-/// curvature of a straight road with a note.
-fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<f64, ImportError> {
+/// Returns the curvature of a road of lines or of one arc, or the alignment of a road with other pieces.
+/// If no alignment follows the road, returns the curvature of a straight road with a note.
+fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<(f64, Option<Alignment>), ImportError> {
     let plan = road.child("planView").ok_or_else(|| road.error(path, "it has no `planView`"))?;
     let shapes: Vec<&Node> = plan.all("geometry").filter_map(|geometry| geometry.children.first()).collect();
     if shapes.is_empty() {
@@ -239,13 +252,16 @@ fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<f64, I
     {
         let curvature = number(path, arc, "curvature")?;
         if Road::CURVATURE_PER_M.contains(curvature) {
-            return Ok(curvature);
+            return Ok((curvature, None));
         }
         notes.push(format!("a curvature of {curvature} 1/m: the road is straight"));
     } else if shapes.iter().any(|shape| shape.name != "line") {
-        notes.push("a curvature that changes: the road is straight".to_owned());
+        match course::alignment(path, plan, notes)? {
+            Ok(alignment) => return Ok((0.0, Some(alignment))),
+            Err(reason) => notes.push(format!("{reason}: the road is straight")),
+        }
     }
-    Ok(0.0)
+    Ok((0.0, None))
 }
 
 /// Returns whether a driving lane does not have the same width everywhere.

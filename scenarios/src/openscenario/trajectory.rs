@@ -125,7 +125,7 @@ impl Storyboard<'_> {
         match position.name.as_str() {
             "WorldPosition" => {
                 let Some(line) = self.road.line else {
-                    let message = "a position in the plane needs a road that is one line or one arc, with its start";
+                    let message = "a position in the plane needs a road whose course is imported, with its start";
                     return Err(reader.error(position, message));
                 };
                 Ok(line.road_point(reader.number(position, "x")?, reader.number(position, "y")?))

@@ -11,7 +11,9 @@ use super::hash::{PlaneNoise, split};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
 
+mod course;
 mod lanes;
+use course::GroundCourse;
 pub(crate) use lanes::{GroundNoise as GroundNoiseLanes, GroundRow};
 
 const EDGE_LINE_HALF_M: f32 = 0.15;
@@ -48,6 +50,8 @@ pub(crate) struct Ground {
     cos: f32,
     sin: f32,
     curvature_per_m: f32,
+    /// The line of a road with an alignment, which `curvature_per_m` does not describe.
+    course: Option<GroundCourse>,
     lane_width_m: f32,
     lanes: f32,
 }
@@ -120,7 +124,8 @@ impl Ground {
             d_m: d_m as f32,
             cos: maths::cos(heading_rad) as f32,
             sin: maths::sin(heading_rad) as f32,
-            curvature_per_m: road.curvature_per_m() as f32,
+            curvature_per_m: road.constant_curvature_per_m().unwrap_or(f64::NAN) as f32,
+            course: road.alignment().map(|_| GroundCourse::new(road, s_m, d_m)),
             lane_width_m: road.lane_width_m() as f32,
             lanes: f32::from(road.lanes()),
         }
@@ -135,6 +140,10 @@ impl Ground {
     fn road_position(&self, x: f32, y: f32) -> (f32, f32) {
         let along = self.cos * x - self.sin * y;
         let across = self.d_m + self.sin * x + self.cos * y;
+        if let Some(course) = &self.course {
+            let [ahead_m, d] = course.position_m(along, across - self.d_m);
+            return (self.s_m + ahead_m, d);
+        }
         let k = self.curvature_per_m;
         if k == 0.0 {
             // What follows then gives the same bits.
@@ -296,7 +305,7 @@ mod tests {
         for (x, y) in [(-10.0, 1.0), (-60.0, -4.0), (-120.0, 3.0)] {
             let (sin, cos) = maths::sin_cos(lens.yaw_rad);
             let plane = (lens.x_m + cos * x - sin * y, lens.y_m + sin * x + cos * y);
-            let (s, d) = road.road_position_m(plane.0, plane.1);
+            let (s, d) = road.road_position_m(plane.0, plane.1, s0);
             let (got_s, got_d) = ground.road_position(x as f32, y as f32);
             assert!((f64::from(got_d) - d).abs() < 0.01, "{got_d} {d}");
             assert!((f64::from(got_s) - s).abs() < 0.1, "{got_s} {s}");

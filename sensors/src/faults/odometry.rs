@@ -143,7 +143,7 @@ impl OdometryErrors {
     pub fn map_of(&self, road: &Road) -> Road {
         let mut map = *road;
         if self.curvature_per_m != 0.0 {
-            map = map.with_curvature(road.curvature_per_m() + self.curvature_per_m);
+            map = map.with_added_curvature(self.curvature_per_m);
         }
         if self.lane_width_m != 0.0 {
             map = map.with_lane_width(road.lane_width_m() + self.lane_width_m);

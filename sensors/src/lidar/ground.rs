@@ -65,11 +65,27 @@ pub(crate) fn select_candidates(
 ) -> Result<(), SensorError> {
     candidates.clear();
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    let (slope, bend, [left_end_m, right_end_m]) =
-        (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32, lane.region_m.map(|end_m| end_m as f32));
+    let (slope, bend) = (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32);
+    match &lane.course {
+        None => select(scan, (lane, |x: f32| (slope + bend * x) * x), time, candidates),
+        #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+        Some(course) => select(scan, (lane, |x: f32| course.y_m(x.into()) as f32), time, candidates),
+    }
+}
+
+/// Does what [`select_candidates`] does along a path whose lateral position is a function of the
+/// longitudinal position.
+fn select(
+    scan: &LidarScan,
+    (lane, path_y_m): (&LaneGeometry, impl Fn(f32) -> f32),
+    time: Time,
+    candidates: &mut Vec<Candidate>,
+) -> Result<(), SensorError> {
+    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    let [left_end_m, right_end_m] = lane.region_m.map(|end_m| end_m as f32);
     let max_side_tan = maths::tan(MAX_SIDE_AZIMUTH_RAD) as f32;
     let is_straight = scan.axis_azimuth_rad == 0.0;
-    let position_m = |x: f32, y: f32| [scan.sensor_x_m - x, y - (slope + bend * x) * x];
+    let position_m = |x: f32, y: f32| [scan.sensor_x_m - x, y - path_y_m(x)];
     // Written without branches, so that the points are tested side by side in vector registers.
     for first in (0..scan.len()).step_by(LANES) {
         let chunk = first..scan.len().min(first + LANES);
@@ -106,8 +122,13 @@ pub(crate) fn select_candidates(
 mod tests {
     use super::*;
 
-    const LANE: LaneGeometry =
-        LaneGeometry { heading_rad: 0.0, curvature_per_m: 0.0, edges_m: [5.6, -5.6], region_m: [9.5, -9.5] };
+    const LANE: LaneGeometry = LaneGeometry {
+        heading_rad: 0.0,
+        curvature_per_m: 0.0,
+        course: None,
+        edges_m: [5.6, -5.6],
+        region_m: [9.5, -9.5],
+    };
 
     fn kept(points: &[[f32; 4]]) -> Result<Vec<u32>, SensorError> {
         kept_on(&LANE, points)

@@ -62,7 +62,7 @@ impl RailReturns {
     /// distance of the rails varies within a column.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     pub(crate) fn new(lane: &LaneGeometry, link: &LinkBudget, beam_height_deg: f64) -> Option<Self> {
-        (lane.curvature_per_m == 0.0).then(|| Self {
+        lane.is_straight().then(|| Self {
             slope: -lane.heading_rad as f32,
             region_m: lane.region_m.map(|end_m| end_m as f32),
             max_error_m: MAX_NORMAL * link.range_sd_m(1.0),

@@ -24,13 +24,16 @@ pub(super) type PlacedSolid = (Solid, PlanePose);
 
 /// Appends the guard rails behind the road position `s_m`.
 pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedSolid>) {
-    let chord = if road.curvature_per_m() == 0.0 { RAIL_REACH_M } else { CHORD_M };
+    let chord = if road.is_straight() { RAIL_REACH_M } else { CHORD_M };
     let [left_m, right_m] = road.guard_rail_offsets_m();
     for (d_m, outward) in [(left_m, 1.0), (road.right_edge_m() - right_m, -1.0)] {
         let mut from = s_m - RAIL_REACH_M;
         while from < s_m {
             let to = (from + chord).min(s_m);
-            let half = 0.5 * (to - from);
+            // On a road with an alignment, the chords of the outer rail are longer than those of the
+            // inner one, so that they meet.
+            let scale = if road.alignment().is_some() { road.path_scale(0.5 * (from + to), d_m) } else { 1.0 };
+            let half = 0.5 * (to - from) * scale;
             let depth = [0.0, outward * BEAM_DEPTH_M];
             let low = [-half, depth[0].min(depth[1]), BEAM_LOW_M];
             let beam = Solid::cuboid(low, [half, depth[0].max(depth[1]), BEAM_TOP_M], Steel);
@@ -88,4 +91,34 @@ pub(super) fn append_roadside(road: &Road, s_m: f64, placed: &mut Vec<PlacedSoli
 fn append_sign([half_m, low_m, high_m]: [f64; 3], pose: PlanePose, placed: &mut Vec<PlacedSolid>) {
     placed.push((Solid::cuboid([-SHEET_M, -half_m, low_m], [0.0, half_m, high_m], Sign), pose));
     placed.push((Solid::cuboid([0.0, -half_m, low_m], [SHEET_M, half_m, high_m], Steel), pose));
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Alignment, AlignmentPoint, maths};
+
+    use super::*;
+
+    #[test]
+    fn the_chords_of_a_rail_follow_the_road_through_clothoids() {
+        let points = [[0.0, 0.0], [60.0, 0.0025], [90.0, 0.0025], [150.0, -0.0025], [200.0, -0.0025]];
+        let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+        let road = Road::straight(3).with_guard_rails().with_alignment(Alignment::new(&points).unwrap());
+        let mut placed = Vec::new();
+        append_guard_rails(&road, 180.0, &mut placed);
+        // The rail at the left edge comes first: 14 chords.
+        let [left_m, _] = road.guard_rail_offsets_m();
+        let chords = &placed[..14];
+        let at = |pose: &PlanePose, along_m: f64| {
+            let (sin, cos) = maths::sin_cos(pose.yaw_rad);
+            road.road_position_m(pose.x_m + along_m * cos, pose.y_m + along_m * sin, 100.0)
+        };
+        for (index, (_, pose)) in chords.iter().enumerate() {
+            let half_m = if index == 13 { 2.0 } else { 6.0 };
+            for along_m in [-half_m, -0.5 * half_m, 0.0, half_m] {
+                let (s_m, d_m) = at(pose, along_m);
+                assert!((d_m - left_m).abs() < 0.05, "{index} {along_m}: {d_m} at {s_m}");
+            }
+        }
+    }
 }

@@ -200,7 +200,7 @@ impl Scanner {
         self.begin(scene.time, mirror_side, (&pose, &link));
         // With a fault, a point may be elsewhere than its return. The limits hold for a sensor that
         // looks straight back along a straight road, whatever the map says.
-        let is_plain = fault.is_none() && !self.lidar.is_turned() && scene.road.curvature_per_m() == 0.0;
+        let is_plain = fault.is_none() && !self.lidar.is_turned() && scene.road.is_straight();
         let rails = if is_plain { RailReturns::new(lane, &link, self.lidar.kind.beam_height_deg) } else { None };
         let fault = fault
             .filter(|fault| fault.changes_points())

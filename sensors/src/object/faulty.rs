@@ -172,8 +172,10 @@ impl Faulty {
         if offset_s != 0.0 {
             let ego_state = &input.scene.ego.state;
             let (sin, cos) = maths::sin_cos(ego_state.heading_rad);
-            let own_mps =
-                [ego_state.speed_mps * cos / input.frame.path_scale(ego_state.d_m), ego_state.speed_mps * sin];
+            let own_mps = [
+                ego_state.speed_mps * cos / input.frame.path_scale(ego_state.s_m, ego_state.d_m),
+                ego_state.speed_mps * sin,
+            ];
             along_m += (own_mps[0] - other.road_mps[0]) * offset_s;
             across_m += (own_mps[1] - other.road_mps[1]) * offset_s;
         }

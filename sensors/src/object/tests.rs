@@ -2,7 +2,8 @@
 //! covariance, and bitwise reproducibility.
 
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Environment, Parameters, Road, Source, Track, TrackStatus, VehicleClass,
+    ActorId, Alignment, AlignmentPoint, CONTROL_STEP, Environment, Parameters, Road, Source, Track, TrackStatus,
+    VehicleClass,
 };
 
 use super::*;
@@ -64,7 +65,7 @@ impl Encounter {
     fn advance(&mut self) {
         self.scans += 1;
         for vehicle in std::iter::once(&mut self.ego).chain(&mut self.others) {
-            let path_scale = 1.0 - self.road.curvature_per_m() * vehicle.state.d_m;
+            let path_scale = self.road.path_scale(vehicle.state.s_m, vehicle.state.d_m);
             vehicle.state.s_m += vehicle.state.speed_mps / path_scale * PERIOD_S;
         }
     }
@@ -90,9 +91,9 @@ fn the_rear_vehicle_is_confirmed_beyond_100_m() {
 }
 
 /// Returns the normalised error squared of the rear track's position and velocity after 100 scans.
-fn rear_error_squared(sample: u64, curvature_per_m: f64) -> f64 {
+fn rear_error_squared(sample: u64, road: Road) -> f64 {
     let (mut encounter, mut perception) = (Encounter::new(), perception(sample));
-    encounter.road = encounter.road.with_curvature(curvature_per_m);
+    encounter.road = road;
     for _ in 0..100 {
         perception.step(&encounter.scene()).unwrap();
         encounter.advance();
@@ -109,12 +110,17 @@ fn rear_error_squared(sample: u64, curvature_per_m: f64) -> f64 {
 
 #[test]
 fn the_covariance_covers_the_errors() {
-    for curvature_per_m in [0.0, 0.001] {
+    // The ego passes the inflection of an S-curve, and the rear vehicle follows it.
+    let points = [[850.0, 0.0], [950.0, 0.001], [1_050.0, 0.001], [1_200.0, -0.001]];
+    let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+    let straight = Road::straight(3);
+    let course = straight.with_alignment(Alignment::new(&points).unwrap());
+    for road in [straight, straight.with_curvature(0.001), course] {
         let samples = 200;
-        let mean = (0..samples).map(|sample| rear_error_squared(sample, curvature_per_m)).sum::<f64>() / samples as f64;
+        let mean = (0..samples).map(|sample| rear_error_squared(sample, road)).sum::<f64>() / samples as f64;
         // The vehicle does not manoeuvre, so its errors are smaller than the process noise allows
         // for: about 4, the number of dimensions, at most, but not much less.
-        assert!((1.0..4.4).contains(&mean), "mean normalised error squared {mean} at curvature {curvature_per_m}");
+        assert!((1.0..4.4).contains(&mean), "mean normalised error squared {mean} on {road:?}");
     }
 }
 

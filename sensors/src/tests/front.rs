@@ -1,7 +1,8 @@
 //! The LiDAR that looks ahead.
 
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass, maths,
+    ActorId, Alignment, AlignmentPoint, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track,
+    TrackStatus, VehicleClass, maths,
 };
 
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
@@ -55,6 +56,11 @@ fn a_vehicle_ahead_gives_one_track_with_gap_speed_and_lane() {
     // less than the tolerance.
     let bend = Road::straight(3).with_curvature(0.000_5).with_guard_rails();
     assert_follows("front-lidar = {}", &bend, VehicleClass::Car, [40.0, 29.0]);
+    // The vehicle is on the clothoid behind the arc on which the ego drives.
+    let points = [[400.0, 0.0], [480.0, 0.000_5], [570.0, 0.000_5], [650.0, -0.000_5]];
+    let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+    let course = Road::straight(3).with_alignment(Alignment::new(&points).unwrap()).with_guard_rails();
+    assert_follows("front-lidar = {}", &course, VehicleClass::Car, [40.0, 29.0]);
 }
 
 #[test]

@@ -108,7 +108,7 @@ impl Bench {
         self.scans += 1;
         for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
             let state = &mut vehicle.state;
-            let path_scale = 1.0 - self.road.curvature_per_m() * state.d_m;
+            let path_scale = self.road.path_scale(state.s_m, state.d_m);
             state.s_m += PERIOD_S * state.speed_mps * maths::cos(state.heading_rad) / path_scale;
             state.d_m += PERIOD_S * state.speed_mps * maths::sin(state.heading_rad);
         }

@@ -102,7 +102,7 @@ impl Candidate {
         }
         let sight = [x_m / distance_m, y_m / distance_m];
         let (sin, cos) = maths::sin_cos(point.road_yaw_rad);
-        let scale = frame.path_scale(across.position_m);
+        let scale = frame.path_scale(along.position_m, across.position_m);
         let of_along = scale * (cos * sight[0] + sin * sight[1]);
         let of_across = cos * sight[1] - sin * sight[0];
         if !(of_along.abs() >= MIN_ALONG) {

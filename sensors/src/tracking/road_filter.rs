@@ -344,7 +344,7 @@ pub struct EgoEstimate {
 pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
     let point = frame.point(along.position_m, across.position_m);
     let (sin, cos) = maths::sin_cos(point.road_yaw_rad);
-    let path_scale = frame.path_scale(across.position_m);
+    let path_scale = frame.path_scale(along.position_m, across.position_m);
     let to_ego = Matrix2::new(cos * path_scale, -sin, sin * path_scale, cos);
     let velocity_mps = to_ego * Vector2::new(along.speed_mps, across.speed_mps);
     let turned = |along: f64, across: f64| to_ego * Matrix2::new(along, 0.0, 0.0, across) * to_ego.transpose();

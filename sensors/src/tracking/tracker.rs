@@ -365,7 +365,7 @@ impl Tracker {
         EgoRear {
             s_m: ego.s_m + rear_x_m,
             d_m: ego.d_m,
-            speed_mps: ego.speed_mps * maths::cos(ego.heading_rad) / frame.path_scale(ego.d_m),
+            speed_mps: ego.speed_mps * maths::cos(ego.heading_rad) / frame.path_scale(ego.s_m, ego.d_m),
             half_lane_m: 0.5 * road.lane_width_m(),
         }
     }
@@ -704,7 +704,7 @@ fn seen_in(seen_by: SeenBy) -> Seen {
 /// the face, because the face defines the gap.
 fn to_track(track: &TrackState, [along, across]: [AxisEstimate; 2], frame: &EgoFrame<'_>, time: Time) -> Track {
     let (length_m, width_m) = track.size_m();
-    let half_length_m = 0.5 * length_m / frame.path_scale(across.position_m);
+    let half_length_m = 0.5 * length_m / frame.path_scale(along.position_m, across.position_m);
     let (front_m, variance_m2) = match track.ends.has_front {
         true => (along.position_m, 0.0),
         false => {

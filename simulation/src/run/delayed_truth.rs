@@ -56,7 +56,7 @@ fn predicted(vehicle: &SceneVehicle, steps: usize, scene: &Scene<'_>) -> SceneVe
     let travelled_m = vehicle.state.speed_mps * steps as f64 * CONTROL_STEP.s();
     let (sin, cos) = maths::sin_cos(vehicle.state.heading_rad);
     let mut later = *vehicle;
-    later.state.s_m += travelled_m * cos / (1.0 - scene.road.curvature_per_m() * vehicle.state.d_m);
+    later.state.s_m = scene.road.advanced_m(vehicle.state.s_m, vehicle.state.d_m, travelled_m * cos);
     later.state.d_m += travelled_m * sin;
     later
 }

@@ -209,10 +209,12 @@ impl<'a> Run<'a> {
     pub(super) fn input(&self) -> EgoInput<'_> {
         let time = self.world.time();
         let is_map_right = self.scenario.sensors.odometry_errors().at(time).is_none();
+        let road = if is_map_right { &self.scenario.road } else { &self.wrong_map };
         EgoInput {
             time,
             odometry: odometry(&self.scenario, &self.world),
-            road: if is_map_right { &self.scenario.road } else { &self.wrong_map },
+            road,
+            curvature_per_m: road.curvature_at_per_m(self.world.state(self.scenario.ego).s_m),
             tracks: if self.looks_back { &self.tracks } else { &self.tracks_ahead },
             sensors: sensor_availability(self.perception.as_ref()),
         }

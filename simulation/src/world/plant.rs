@@ -262,10 +262,10 @@ impl Plant {
         let slip_rad = if slip_sin == 0.0 { slip_sin } else { maths::asin(slip_sin) };
         self.state.d_m = d_m;
         self.state.heading_rad = course_rad - slip_rad;
-        self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_per_m());
+        self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_at_per_m(self.state.s_m));
         // In a curve, a distance along the lane differs from the distance along the road's
         // reference line.
-        self.state.s_m += along_m / (1.0 - road.curvature_per_m() * d_m);
+        self.state.s_m = road.advanced_m(self.state.s_m, d_m, along_m);
     }
 
     /// Returns the actual lateral state: the intended one plus the deviation.
@@ -306,7 +306,7 @@ fn advance(speed_mps: f64, acceleration_mps2: f64, step_s: f64) -> Advance {
 #[cfg(test)]
 mod tests {
     use closecall_controllers::LaneKeepingConfig;
-    use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, Side, stream};
+    use closecall_traffic::{ActorId, Alignment, AlignmentPoint, Check, PHYSICS_STEP, Parameters, Side, stream};
 
     use super::*;
 
@@ -356,6 +356,31 @@ mod tests {
             car.step(0.05, Indicator::Off, &road);
         }
         assert!(car.state().speed_mps > 0.0 && car.state().speed_mps < STANDING_MPS, "{:?}", car.state());
+    }
+
+    #[test]
+    fn a_vehicle_in_its_lane_follows_an_s_curve_with_the_lateral_acceleration_of_its_curvature() {
+        let points = [[20.0, 0.0], [120.0, 0.002], [180.0, 0.002], [300.0, -0.001], [360.0, -0.001]];
+        let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+        let road = Road::straight(3).with_alignment(Alignment::new(&points).unwrap());
+        let mut car = car(30.0);
+        let (mut driven_m, mut largest_mps2) = (0.0, 0.0_f64);
+        let mut before = road.plane_pose(0.0, -5.625, 0.0);
+        for _ in 0..1_300 {
+            let s_m = car.state().s_m;
+            car.step(0.0, Indicator::Off, &road);
+            let state = *car.state();
+            assert_eq!((state.d_m, state.heading_rad), (-5.625, 0.0));
+            let lateral_mps2 = state.speed_mps * state.yaw_rate_radps;
+            assert!((lateral_mps2 - 900.0 * road.curvature_at_per_m(s_m)).abs() < 1e-9, "{lateral_mps2} at {s_m}");
+            largest_mps2 = largest_mps2.max(lateral_mps2);
+            // In the plane, it drives as far as its speed says.
+            let pose = road.plane_pose(state.s_m, state.d_m, 0.0);
+            driven_m += maths::hypot(pose.x_m - before.x_m, pose.y_m - before.y_m);
+            before = pose;
+        }
+        assert!((largest_mps2 - 1.8).abs() < 1e-9, "{largest_mps2}");
+        assert!(car.state().s_m > 360.0 && (driven_m - 30.0 * 1_300.0 * STEP_S).abs() < 1e-3, "{driven_m}");
     }
 
     #[test]

@@ -424,7 +424,7 @@ impl World {
 /// Returns the state of a wreck in the road frame. Its acceleration is the change of speed since
 /// the state `before`.
 fn road_state(motion: &Motion, road: &Road, before: &VehicleState, step_s: f64) -> VehicleState {
-    let (s_m, d_m) = road.road_position_m(motion.position_m.x, motion.position_m.y);
+    let (s_m, d_m) = road.road_position_m(motion.position_m.x, motion.position_m.y, before.s_m);
     let speed_mps = motion.velocity_mps.norm();
     VehicleState {
         s_m,

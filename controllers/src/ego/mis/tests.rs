@@ -131,7 +131,8 @@ impl Bench {
         };
         let (time, road) = (self.time, &self.road);
         self.time += CONTROL_STEP;
-        self.stack.step(&EgoInput { time, odometry, road, tracks: &self.tracks, sensors: self.sensors })
+        let (tracks, sensors) = (&self.tracks, self.sensors);
+        self.stack.step(&EgoInput { time, odometry, road, curvature_per_m: 0.0, tracks, sensors })
     }
 
     /// Steps for `seconds` and returns the last command.

@@ -123,7 +123,7 @@ fn multiples(period_m: f64, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f6
 /// Returns the positions along the road (m) at which a stretch of it is divided into straight
 /// pieces.
 fn piece_ends(road: &Road, [from_m, to_m]: [f64; 2]) -> Vec<f64> {
-    if road.curvature_per_m() == 0.0 {
+    if road.is_straight() {
         return vec![from_m, to_m];
     }
     let count = ((to_m - from_m) / PIECE_M).ceil().max(1.0);

@@ -95,6 +95,11 @@ impl Ground {
     fn road_positions(&self, x: f32x4, y: f32x4) -> (f32x4, f32x4) {
         let along = splat(self.cos) * x - splat(self.sin) * y;
         let across = splat(self.d_m) + splat(self.sin) * x + splat(self.cos) * y;
+        if let Some(course) = &self.course {
+            let (along, left) = (along.to_array(), (across - splat(self.d_m)).to_array());
+            let at: [[f32; 2]; 4] = std::array::from_fn(|moment| course.position_m(along[moment], left[moment]));
+            return (splat(self.s_m) + f32x4::from(at.map(|at| at[0])), f32x4::from(at.map(|at| at[1])));
+        }
         if self.curvature_per_m == 0.0 {
             return (splat(self.s_m) + along, across);
         }

@@ -1,6 +1,7 @@
 //! Curved roads, motion during the sweep, and bit-for-bit repeatability.
 
-use closecall_traffic::{Road, VehicleClass};
+use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::{Alignment, AlignmentPoint, Road, VehicleClass};
 
 use super::*;
 
@@ -16,6 +17,65 @@ fn boxes_follow_the_curvature_of_the_road() {
     let expected = 0.5 * kappa * detections[0].face_x_m.powi(2);
     assert!((detections[0].face_y_m - expected).abs() < 0.2, "{} for {expected}", detections[0].face_y_m);
     assert!((detections[0].heading_rad - kappa * detections[0].face_x_m).abs() < 0.02, "{}", detections[0].heading_rad);
+}
+
+/// Returns a road of three lanes whose curvature has these values at these positions.
+fn course(points: &[[f64; 2]]) -> Road {
+    let points: Vec<_> = points.iter().map(|&[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m }).collect();
+    Road::straight(3).with_alignment(Alignment::new(&points).unwrap())
+}
+
+#[test]
+fn boxes_on_a_clothoid_lie_where_the_vehicle_is() {
+    // The vehicle has just left an arc to the right, and the ego is on an arc to the left.
+    let road = course(&[[920.0, -0.002], [990.0, 0.002]]);
+    for gap_m in [25.0, 60.0] {
+        let mut setup = TestScene::new().with(VehicleClass::Car, gap_m, 0.0);
+        setup.road = road;
+        let mut lidar = RearLidar::new(Lidar::default());
+        let detections = setup.detect(&mut lidar, 0);
+        assert_eq!(detections.len(), 1, "{gap_m}");
+        let since_s = (setup.time - detections[0].time).s();
+        let state = &setup.others[0].state;
+        let half_m = 0.5 * setup.others[0].vehicle.dimensions.length_m;
+        let frame = EgoFrame::new(&road, &setup.ego.state);
+        let face = frame.point(state.s_m + half_m - SPEED_MPS * since_s, state.d_m);
+        let found = &detections[0];
+        assert!((found.face_x_m - face.x_m).abs() < 0.3, "{gap_m}: {} for {}", found.face_x_m, face.x_m);
+        assert!((found.face_y_m - face.y_m).abs() < 0.2, "{gap_m}: {} for {}", found.face_y_m, face.y_m);
+        assert!((found.heading_rad - face.road_yaw_rad).abs() < 0.03, "{gap_m}: {}", found.heading_rad);
+    }
+}
+
+#[test]
+fn points_of_guard_rails_lie_on_the_rails_of_an_s_curve() {
+    let road = course(&[[960.0, -0.0025], [990.0, 0.0025]]).with_guard_rails();
+    let mut setup = TestScene::new();
+    setup.road = road;
+    let mut lidar = RearLidar::new(Lidar::default());
+    setup.detect(&mut lidar, 0);
+    let complete = lidar.completed().unwrap();
+    let (scan, truth) = (complete.latest(), complete.truth());
+    let [left_m, right_m] = road.guard_rail_offsets_m();
+    let rails_m = [left_m, road.right_edge_m() - right_m];
+    // The share of the points behind the clothoid that lie on a rail of a road, and their number.
+    let share_on = |road: &Road| {
+        let frame = EgoFrame::new(road, &setup.ego.state);
+        let of_rails = truth.points.iter().enumerate().filter(|(_, point)| point.source == PointSource::GuardRail);
+        let on_rails: Vec<bool> = of_rails
+            .filter(|(index, _)| scan.x_m[*index] < -40.0)
+            .map(|(index, _)| {
+                let d_m = frame.lateral_position_m(scan.x_m[index].into(), scan.y_m[index].into());
+                rails_m.iter().any(|rail_m| (d_m - rail_m).abs() < 0.25)
+            })
+            .collect();
+        (on_rails.iter().filter(|is_on| **is_on).count() as f64 / on_rails.len() as f64, on_rails.len())
+    };
+    let (share, count) = share_on(&road);
+    assert!(count > 10 && share > 0.9, "{share} of {count}");
+    // The arc at the ego is another road.
+    let (on_arc, _) = share_on(&Road::straight(3).with_curvature(0.0025));
+    assert!(on_arc < 0.2, "{on_arc}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Occlusion, pitch, spray, fog and guard rails.
 
-use closecall_traffic::{ClassScores, VehicleClass};
+use closecall_traffic::{Alignment, AlignmentPoint, ClassScores, VehicleClass};
 
 use super::*;
 use crate::faults::LidarFault;
@@ -127,16 +127,19 @@ fn fog_gives_false_returns_that_are_not_classified_as_vehicles() {
 
 #[test]
 fn guard_rails_give_returns_but_no_vehicle_detections() {
-    for curvature in [0.0, 0.0025, -0.0025] {
+    let points = [[900.0, -0.0025], [980.0, 0.0025]];
+    let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+    let course = Road::straight(3).with_alignment(Alignment::new(&points).unwrap()).with_guard_rails();
+    for road in [0.0, 0.0025, -0.0025].map(road_with_guard_rails).into_iter().chain([course]) {
         let mut setup = TestScene::new().with(VehicleClass::Car, 30.0, 0.0).with(VehicleClass::Car, 20.0, -3.75);
-        setup.road = road_with_guard_rails(curvature);
+        setup.road = road;
         let mut lidar = RearLidar::new(Lidar::default());
         for scan_index in 0..2 {
             let detections = setup.detect(&mut lidar, scan_index);
             let complete = lidar.completed().unwrap();
-            assert!(count(complete.truth(), PointSource::GuardRail) > 50, "{curvature}");
+            assert!(count(complete.truth(), PointSource::GuardRail) > 50, "{road:?}");
             let vehicles: Vec<_> = detections.iter().filter(|detection| detection.class.vehicle() > 0.5).collect();
-            assert_eq!(vehicles.len(), 2, "{curvature}: {vehicles:?}");
+            assert_eq!(vehicles.len(), 2, "{road:?}: {vehicles:?}");
         }
     }
 }

@@ -71,7 +71,7 @@ impl Setup {
             ego_length_m: ego.length_m,
             ego_width_m: ego.width_m,
             lane_width_m: road.lane_width_m,
-            curvature_per_m: road.curvature_per_m,
+            curvature_per_m: road.curvature_per_m.unwrap_or(f64::NAN),
             speed_limit_mps: road.speed_limit_mps,
             lanes: road.lanes.into(),
             overtaking_side: number_of(road.overtaking_side),
