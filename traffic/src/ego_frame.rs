@@ -104,7 +104,7 @@ impl<'a> EgoFrame<'a> {
     /// Returns the lateral road coordinate d (m) of a point in the ego's frame.
     ///
     /// The ego knows it from its lane camera and its map.
-    fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
+    pub fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
         let Course::Constant(curvature) = *self.road.course() else { return self.road_position_m(x_m, y_m).1 };
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
