@@ -29,6 +29,8 @@ struct Knot {
     direction: [f32; 2],
     /// Curvature at d = 0 (1/m).
     curvature_per_m: f32,
+    /// Length of the line d = 0 for each metre of s: a reversed road measures s along its other edge.
+    scale: f32,
 }
 
 /// The line d = 0 of a road about the lens.
@@ -51,6 +53,7 @@ impl GroundCourse {
                 at_m: [point.x_m as f32, point.y_m as f32],
                 direction: [cos as f32, sin as f32],
                 curvature_per_m: road.parallel_curvature_per_m(at_s_m, 0.0) as f32,
+                scale: road.path_scale(at_s_m, 0.0) as f32,
             }
         });
         Self { knots }
@@ -76,14 +79,14 @@ impl GroundCourse {
     /// Returns the distance along the road from a knot, and the lateral position (m), on the arc of
     /// the knot.
     fn near(&self, index: usize, ahead_m: f32, left_m: f32) -> (f32, f32) {
-        let Knot { at_m, direction: [cos, sin], curvature_per_m: k } = self.knots[index];
+        let Knot { at_m, direction: [cos, sin], curvature_per_m: k, scale } = self.knots[index];
         let (to_x, to_y) = (ahead_m - at_m[0], left_m - at_m[1]);
         let (along, across) = (to_x * cos + to_y * sin, to_y * cos - to_x * sin);
         let q = k * (along * along + across * across) - 2.0 * across;
         let d = -q / (1.0 + (1.0 + k * q).max(0.0).sqrt());
         let tangent = along / (1.0 - k * across);
         let bend = k * tangent;
-        (tangent * (1.0 - bend * bend / 3.0), d)
+        (tangent * (1.0 - bend * bend / 3.0) / scale, d)
     }
 }
 
