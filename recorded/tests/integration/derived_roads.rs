@@ -7,8 +7,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use closecall_recorded::filters::smooth;
-use closecall_recorded::lane_change::{LaneReliability, Score, detect, read_references, score};
-use closecall_recorded::trajectory_data::{ReadOptions, TrajectoryData, TrajectoryFileProblem, open_from, read};
+use closecall_recorded::lane_change::{LaneReliability, detect};
+use closecall_recorded::trajectory_data::{
+    ReadOptions, TrajectoryData, TrajectoryFileProblem, open_from, read, read_with,
+};
 use closecall_traffic::{Side, Time, Trajectory, maths};
 
 use crate::support::{data_folder, read_text};
@@ -243,30 +245,32 @@ fn vehicles_of_us_101_that_keep_their_named_lane_change_no_lane_in_dense_traffic
 }
 
 #[test]
-fn us_101_in_a_plane_without_names_of_lanes_has_nine_of_ten_lane_changes() {
-    let Some(folder) = data_folder() else { return };
-    let references = read_references(&folder.join("ngsim_us101/reference_lane_changes.csv")).unwrap();
+fn us_101_in_a_plane_without_names_of_lanes_has_the_lane_changes_of_estimated_lanes() {
+    // A known road says more than positions in a plane: what is found along it is what can be found.
+    let unnamed = || ReadOptions { lanes: LaneReliability::Unreliable, ..ReadOptions::default() };
+    let sides = |changes: &[Change]| -> Vec<(u64, Side)> {
+        changes.iter().map(|&(vehicle, side, _)| (vehicle, side)).collect()
+    };
     for course in [Course::Straight, Course::Bend] {
-        let mut total = Score::default();
+        let (mut along_the_road, mut in_a_plane, mut of_both, mut true_ones) = (0, 0, 0, 0);
         for name in ["us101_a", "us101_b", "us101_f", "us101_g", "us101_h"] {
-            let Some((recorded, _)) = us_101(name) else { return };
-            let text = sumo(&rows(&recorded.trajectories), course, |_| String::new()).replace(" lane=\"\"", "");
-            let options = ReadOptions { lanes: LaneReliability::Unreliable, ..ReadOptions::default() };
-            let tracks = open_from(text.as_bytes(), Path::new("made-up.xml"), options, usize::MAX).unwrap();
-            let data = tracks.collect_all().unwrap();
-            let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == recorded.name).collect();
-            // A vehicle of the made-up file has the number of a recorded track.
-            let spans = data.trajectories.iter().filter_map(|track| Some((track.vehicle_id, track.span()?))).collect();
-            let mut changes = detect(&smooth(&data));
-            changes.iter_mut().for_each(|change| change.track_id = change.vehicle_id);
-            let scored = score(&changes, &listed, &spans);
-            eprintln!("{name}, {course:?}: recall {}, precision {}", scored.recall, scored.precision);
-            total.add(&scored);
+            let Some((data, listed)) = us_101(name) else { return };
+            let path = data_folder().unwrap().join("ngsim_us101/trajectories").join(format!("{name}.csv"));
+            let estimated = detect(&smooth(&read_with(&path, unnamed()).unwrap()));
+            let estimated: Vec<_> = estimated.iter().map(|change| (change.track_id, change.direction)).collect();
+            let text = sumo(&rows(&data.trajectories), course, |_| String::new()).replace(" lane=\"\"", "");
+            let tracks = open_from(text.as_bytes(), Path::new("made-up.xml"), unnamed(), usize::MAX).unwrap();
+            let derived = sides(&lane_changes_of(&tracks.collect_all().unwrap()));
+            let listed = sides(&listed);
+            along_the_road += estimated.len();
+            in_a_plane += derived.len();
+            of_both += estimated.iter().filter(|change| derived.contains(change)).count();
+            true_ones += derived.iter().filter(|change| listed.contains(change)).count();
+            eprintln!("{name}, {course:?}: {derived:?} in a plane, {estimated:?} along the road");
         }
-        let Score { recall, precision, .. } = total;
-        assert!(recall.of >= 15 && precision.of >= 20, "too little data for a statement: {recall}, {precision}");
-        assert!(recall.hits * 100 >= recall.of * 90, "{course:?}: recall {recall}");
-        assert!(precision.hits * 100 >= precision.of * 90, "{course:?}: precision {precision}");
+        assert!(along_the_road >= 25, "too little data for a statement: {along_the_road}");
+        assert!(of_both * 10 >= along_the_road * 9, "{course:?}: {of_both} of {along_the_road} are found");
+        assert!(true_ones * 10 >= in_a_plane * 9, "{course:?}: {true_ones} of {in_a_plane} are in the recording");
     }
 }
 

@@ -33,8 +33,9 @@ const ARMS: [(&str, &str); 4] = [
 /// directly ahead.
 const NO_ANTICIPATION: &str = "anticipation-none";
 
-/// The folders of scenarios that judge the margin increase system. Faults have a page of their own.
-const FOLDERS: [&str; 4] = ["", "as-recorded", "ramp", TRAFFIC];
+/// The folders of scenarios that judge the margin increase system. Faults have a page of their own,
+/// and the headline as recorded a table: in some of its samples there is no room for `gap-1.6`.
+const FOLDERS: [&str; 3] = ["", "ramp", TRAFFIC];
 
 /// The folder of the scenarios with surrounding traffic, which take longer.
 const TRAFFIC: &str = "traffic";
