@@ -433,7 +433,7 @@ fn each_collision_has_the_answer_of_an_explanation_by_whom_it_was_avoidable() {
         rows.flat_map(|chunk| texts(chunk, "avoidable_by")).collect()
     };
     for (index, words) in words.iter().enumerate() {
-        assert_eq!(of(index + 1), [words.clone()]);
+        assert_eq!(of(index + 1), std::slice::from_ref(words));
     }
     assert!(of(words.len() + 1).is_empty());
     let passes = filmed("paper-figure", ControllerChoice::MIS, (None, Level::Events));
