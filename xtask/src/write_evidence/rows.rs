@@ -39,7 +39,7 @@ const DISTRIBUTIONS: [Row; 9] = [
 
 /// Scenarios in which nothing happens ahead: the twins of scenarios with a hazard, and scenarios
 /// that never had a hazard.
-pub(super) const TWINS: [&str; 11] = [
+pub(super) const TWINS: [&str; 10] = [
     "cut-in-into-margin-without-cut-in",
     "overtake-without-brake",
     "rear-follower-stays",
@@ -47,7 +47,6 @@ pub(super) const TWINS: [&str; 11] = [
     "rear-vehicles-one-after-another-without-brake",
     "slow-approach",
     "empty-wet-road",
-    "ramp/ramp-merges-without-merge",
     "traffic/busy-overtake-without-brake",
     "traffic/dense-traffic",
     "traffic/trucks-alongside",
