@@ -213,8 +213,8 @@ impl Alignment {
             let back_m = |steps: usize| index.checked_sub(steps).map(|before| point.s_m - points[before].s_m);
             let is_jump = back_m(1) == Some(0.0) && back_m(2) != Some(0.0);
             if !(is_jump || back_m(1).is_none_or(|step_m| step_m >= LEAST_SPACING_M)) {
-                let rule = "a point lies 1 m or more behind the point before it, or at the same position as one \
-                            other point, which is a jump of the curvature"
+                let rule = "positions increase by 1 m or more from point to point; two points at one position are \
+                            a jump of the curvature"
                     .to_owned();
                 return Err(at(ConfigError::new("s-m", Problem::Contradiction { other: "road.alignment", rule })));
             }
@@ -286,7 +286,7 @@ impl Alignment {
         AlignmentPiece { start_m: from_m, length_m: to_m - from_m, curvatures_per_m }
     }
 
-    /// Returns the pieces between two positions, of which the first is the smaller one.
+    /// Returns the pieces between two positions. `from_m` is the smaller one.
     fn pieces_with_jumps(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = AlignmentPiece> {
         let mut index = self.last_before(from_m);
         let mut at_m = Some(from_m);
@@ -303,7 +303,7 @@ impl Alignment {
         })
     }
 
-    /// Returns the pieces between two positions, of which the first is the smaller one.
+    /// Returns the pieces between two positions. `from_m` is the smaller one.
     pub fn pieces(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = AlignmentPiece> {
         self.pieces_with_jumps(from_m, to_m).filter(|piece| piece.length_m > 0.0)
     }
