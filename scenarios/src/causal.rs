@@ -148,20 +148,36 @@ impl CausalSentence<'_> {
         let did = match mis.engaged_at_s {
             Ok(engaged_at_s) => {
                 let vehicle = self.engaged_for.map_or_else(String::new, |vehicle| format!(" for {vehicle}"));
-                format!("the MIS engaged{vehicle} at {engaged_at_s:.1} s{}", self.engaged(mis, engaged_at_s))
+                let delay = mis.delay_words().map_or_else(String::new, |words| format!("; not sooner: {words}"));
+                format!("the MIS engaged{vehicle} at {engaged_at_s:.1} s{}{delay}", self.engaged(mis, engaged_at_s))
             }
             Err(_) => format!("the MIS stayed off: {}", mis.reason_words()),
         };
         Some(format!("{did}{gone}"))
     }
 
-    /// Returns how long before or after the braking the MIS engaged, and how much it could do.
-    fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
-        let when = self.outcome.reached(Moment::FrontBrakes).map_or_else(String::new, |reached| {
-            let before_s = reached.time.s() - engaged_at_s;
+    /// Returns whether and when an ego without an MIS braked in an emergency. `None` if it has an MIS, or the outcome does
+    /// not say it.
+    pub fn emergency_braking(&self) -> Option<String> {
+        let ahead = self.outcome.ahead.filter(|_| self.outcome.mis.is_err())?;
+        Some(match ahead.emergency_braking_at_s {
+            Ok(at_s) => format!("E braked in an emergency at {at_s:.1} s{}", self.since_braking(at_s)),
+            Err(_) => "E did not brake in an emergency".to_owned(),
+        })
+    }
+
+    /// Returns how long before or after the braking of the lead vehicle a time lies.
+    fn since_braking(&self, time_s: f64) -> String {
+        self.outcome.reached(Moment::FrontBrakes).map_or_else(String::new, |reached| {
+            let before_s = reached.time.s() - time_s;
             let side = if before_s >= 0.0 { "before" } else { "after" };
             format!(", {:.1} s {side} {} braked", before_s.abs(), self.letters.of_moment(reached))
-        });
+        })
+    }
+
+    /// Returns how long before or after the braking the MIS engaged, and how much it could do.
+    fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
+        let when = self.since_braking(engaged_at_s);
         let gained = match (mis.thw_front_at_engagement_s, mis.thw_front_at_critical_s) {
             (Ok(before_s), Ok(after_s)) => format!(", front headway {before_s:.2} to {after_s:.2} s"),
             _ => String::new(),
@@ -207,8 +223,8 @@ impl CausalSentence<'_> {
 
     /// Returns the part of the sentence about the system and the faults.
     pub fn reason(&self) -> String {
-        let mis = self.mis().map_or_else(String::new, |mis| format!("{mis}; "));
-        format!("{mis}faults: {}", self.faults())
+        let did = self.mis().or_else(|| self.emergency_braking()).map_or_else(String::new, |did| format!("{did}; "));
+        format!("{did}faults: {}", self.faults())
     }
 }
 
@@ -228,7 +244,7 @@ mod tests {
     use closecall_traffic::{Absent, Parameters};
 
     use super::*;
-    use crate::outcome::{ClosedBy, EndReason, Margins, Phase, ReachedMoment, ReasonSpan};
+    use crate::outcome::{Ahead, ClosedBy, EndReason, Margins, Phase, ReachedMoment, ReasonSpan};
 
     fn id(name: &str) -> ActorId {
         ActorId::new(name).unwrap()
@@ -306,7 +322,7 @@ mod tests {
         assert_eq!(label(Moment::CriticalDistance, "rear"), "(e) R is at the critical distance");
         assert_eq!(label(Moment::CriticalDistance, "second"), "(e) second is at the critical distance");
         assert_eq!(label(Moment::Hazard, "third"), "(a) E brakes hard in front of third");
-        assert_eq!(label(Moment::Concluded, "third"), "third has concluded");
+        assert_eq!(label(Moment::Concluded, "third"), "third has passed E");
         assert_eq!(label(Moment::FrontBrakes, "front"), "(d) F brakes");
         assert_eq!(label(Moment::FrontBrakes, "rear"), "(d) R brakes", "it has overtaken, and is ahead now");
     }
@@ -361,6 +377,36 @@ mod tests {
             "the MIS engaged for a vehicle that does not exist at 2.0 s, 7.0 s before F braked; faults: none"
         );
         assert_eq!(told(None), "the MIS engaged at 2.0 s, 7.0 s before F braked; faults: none");
+    }
+
+    #[test]
+    fn an_ego_without_an_mis_is_told_by_its_emergency_braking() {
+        let run = |emergency_braking_at_s, mis| {
+            let run = outcome(Vec::new(), Reason::RearFar);
+            let ahead = Some(Ahead { min_ttc_front_s: Ok(2.5), emergency_braking_at_s });
+            Outcome { ahead, mis: if mis { run.mis } else { Err(Absent::NoMis) }, ..run }
+        };
+        let told = |run: &Outcome| sentence(run, &[]);
+        let never = Err(Absent::NoEmergencyBraking);
+        assert_eq!(
+            told(&run(Ok(9.8), false)),
+            "no vehicle collided; F braked at 9.00 s; E braked in an emergency at 9.8 s, 0.8 s after F braked; faults: none"
+        );
+        assert!(told(&run(never, false)).contains("; E did not brake in an emergency; faults: none"));
+        assert!(!told(&run(Ok(9.8), true)).contains("emergency"), "the MIS is what is judged");
+        let older = Outcome { ahead: None, ..run(never, false) };
+        assert!(!told(&older).contains("emergency"), "a journal that does not say it");
+    }
+
+    #[test]
+    fn a_late_engagement_says_why_it_was_not_sooner() {
+        let mut run = outcome(Vec::new(), Reason::Engaged);
+        let mis = run.mis.as_mut().unwrap();
+        mis.engaged_at_s = Ok(6.2);
+        mis.decided_s = Some([2.7, 9.0]);
+        mis.reasons = vec![ReasonSpan { reason: Reason::NoRear, from_s: 2.0, until_s: 6.2 }];
+        let expected = format!("before F braked; not sooner: {}, 2.7 to 6.2 s; faults: none", Reason::NoRear);
+        assert!(sentence(&run, &[]).ends_with(&expected), "{}", sentence(&run, &[]));
     }
 
     #[test]

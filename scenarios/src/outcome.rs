@@ -159,7 +159,7 @@ impl Moment {
             Self::FrontBrakes => format!("{vehicle} brakes"),
             Self::CriticalDistance => format!("{vehicle} is at the critical distance"),
             Self::Crossed => format!("{vehicle} has left the lane"),
-            Self::Concluded => format!("{vehicle} has concluded"),
+            Self::Concluded => format!("{vehicle} has passed E"),
         }
     }
 
@@ -279,6 +279,10 @@ pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Opti
         .or_else(|| before().next_back().map(|span| span.reason))
 }
 
+/// Time after which an engagement is late, and its delay has a reason that is told (s). It is an assumption that a
+/// reader asks for the reason of a delay that a driver would notice: 0.5 to 2 s are plausible.
+const LATE_S: f64 = 1.0;
+
 /// The actions of the margin increase system (MIS) in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
@@ -313,11 +317,10 @@ pub struct MisSummary {
 }
 
 impl MisSummary {
-    /// Returns the longest time without a break over which the stated reason held in `decided_s`, or in the run if no
-    /// vehicle behind met the conditions (s). `None` if it held for no time.
-    fn reason_span_s(&self) -> Option<[f64; 2]> {
-        let [from_s, until_s] = self.decided_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let spans = self.reasons.iter().filter(|span| span.reason == self.reason);
+    /// Returns the longest time without a break over which a reason held in an interval (s). `None` if it held for no
+    /// time.
+    fn held_s(&self, reason: Reason, [from_s, until_s]: [f64; 2]) -> Option<[f64; 2]> {
+        let spans = self.reasons.iter().filter(|span| span.reason == reason);
         let held = spans.map(|span| [span.from_s.max(from_s), span.until_s.min(until_s)]);
         let lasted_s = |span: &[f64; 2]| span[1] - span[0];
         held.filter(|span| lasted_s(span) > 0.0).max_by(|a, b| lasted_s(a).total_cmp(&lasted_s(b)))
@@ -327,10 +330,25 @@ impl MisSummary {
     /// to 9.6 s*. A controller that gives no reason of this program has no such time.
     pub fn reason_words(&self) -> String {
         let says_nothing = self.engaged_at_s.is_ok() || self.reason == Reason::External;
-        match self.reason_span_s().filter(|_| !says_nothing) {
+        let interval_s = self.decided_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        match self.held_s(self.reason, interval_s).filter(|_| !says_nothing) {
             Some([from_s, until_s]) => format!("{}, {from_s:.1} to {until_s:.1} s", self.reason),
             None => self.reason.to_string(),
         }
+    }
+
+    /// Returns why the system did not engage sooner, and over which time that held: *no vehicle behind in the lane, 2.7
+    /// to 6.2 s*. `None` if it engaged within [`LATE_S`] after the vehicle behind met the conditions on distance and
+    /// speed, or never.
+    pub fn delay_words(&self) -> Option<String> {
+        let (engaged_at_s, [from_s, until_s]) = (self.engaged_at_s.ok()?, self.decided_s?);
+        let waited_s = [from_s, engaged_at_s.min(until_s)];
+        if !(waited_s[1] - waited_s[0] > LATE_S) {
+            return None;
+        }
+        let reason = longest_reason(&self.reasons, waited_s)?;
+        let [from_s, until_s] = self.held_s(reason, waited_s).filter(|_| reason != Reason::External)?;
+        Some(format!("{reason}, {from_s:.1} to {until_s:.1} s"))
     }
 }
 
@@ -555,6 +573,42 @@ mod tests {
         mis.reason = Reason::External;
         mis.reasons = vec![span(Reason::External, 0.0, 30.0)];
         assert_eq!(mis.reason_words(), "the controller's own reason");
+    }
+
+    #[test]
+    fn a_late_engagement_has_the_reason_that_held_longest_until_then() {
+        let never = Err(Absent::NeverEngaged);
+        let mut mis = MisSummary {
+            engaged_at_s: Ok(6.2),
+            released_at_s: never,
+            thw_front_at_engagement_s: never,
+            thw_front_at_critical_s: never,
+            mean_deceleration_mps2: never,
+            goal_in_reach: None,
+            reason: Reason::EngagedGoalOutOfReach,
+            reasons: vec![
+                span(Reason::RearFar, 0.0, 3.0),
+                span(Reason::NoRear, 3.0, 6.2),
+                span(Reason::EngagedGoalOutOfReach, 6.2, 9.0),
+            ],
+            decided_s: Some([2.7, 9.0]),
+            unavailable: None,
+        };
+        let expected = format!("{}, 3.0 to 6.2 s", Reason::NoRear);
+        assert_eq!(
+            mis.delay_words().as_deref(),
+            Some(expected.as_str()),
+            "neither what held before nor the engagement"
+        );
+        mis.decided_s = Some([5.9, 9.0]);
+        assert_eq!(mis.delay_words(), None, "not late");
+        mis.decided_s = Some([7.0, 9.0]);
+        assert_eq!(mis.delay_words(), None, "engaged for an earlier vehicle");
+        mis.decided_s = None;
+        assert_eq!(mis.delay_words(), None);
+        mis.decided_s = Some([2.7, 9.0]);
+        mis.engaged_at_s = never;
+        assert_eq!(mis.delay_words(), None, "never engaged: the stated reason says why");
     }
 
     #[test]

@@ -94,9 +94,11 @@ impl Faults {
         }
         if !self.odometry.is_none() {
             let [from_s, until_s] = self.odometry.span_s();
-            let effects = self.odometry.effects().join(", ");
-            let (group, sensor) = (SensorGroup::Odometry, "odometry and map".to_owned());
-            stated.push(StatedFault { group, sensor, effects, from_s, until_s });
+            let parts = [("odometry", self.odometry.effects_on_odometry()), ("map", self.odometry.effects_on_map())];
+            stated.extend(parts.into_iter().filter(|(_, effects)| !effects.is_empty()).map(|(source, effects)| {
+                let (group, effects) = (SensorGroup::Odometry, effects.join(", "));
+                StatedFault { group, sensor: source.to_owned(), effects, from_s, until_s }
+            }));
         }
         stated
     }
@@ -222,15 +224,44 @@ impl Effects for RadarFault {
     }
 }
 
-impl Effects for OdometryErrors {
-    fn effects(&self) -> Vec<String> {
+impl OdometryErrors {
+    /// Returns the errors of the ego's own motion and position in words.
+    fn effects_on_odometry(&self) -> Vec<String> {
         those([
-            (self.speed_scale != 0.0, format!("own speed wrong by {:.1} %", 100.0 * self.speed_scale)),
-            (self.lateral_m != 0.0, format!("own position wrong by {:.2} m", self.lateral_m)),
-            (self.heading_rad != 0.0, format!("own heading wrong by {:.1}°", self.heading_rad.to_degrees())),
-            (self.curvature_per_m != 0.0, "wrong curvature on the map".to_owned()),
-            (self.lane_width_m != 0.0, format!("lanes on the map wrong by {:.2} m", self.lane_width_m)),
-            (self.has_no_rails, "no guard rails on the map".to_owned()),
+            (self.speed_scale != 0.0, format!("with speed wrong by {:.1} %", 100.0 * self.speed_scale)),
+            (self.lateral_m != 0.0, format!("with position wrong by {:.2} m", self.lateral_m)),
+            (self.heading_rad != 0.0, format!("with heading wrong by {:.1}°", self.heading_rad.to_degrees())),
         ])
+    }
+
+    /// Returns the errors of the map in words.
+    fn effects_on_map(&self) -> Vec<String> {
+        those([
+            (self.curvature_per_m != 0.0, "with wrong curvature".to_owned()),
+            (self.lane_width_m != 0.0, format!("with lane width wrong by {:.2} m", self.lane_width_m)),
+            (self.has_no_rails, "without guard rails".to_owned()),
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_odometry_and_of_the_map_are_told_apart() {
+        let told = |odometry| {
+            let faults = Faults { odometry, ..Faults::default() };
+            let acting =
+                ActingSensors { is_full: false, has_front_lidar: false, has_rear_radar: false, has_models: true };
+            faults.stated(acting).iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        let none = OdometryErrors::default();
+        assert!(told(none).is_empty());
+        assert_eq!(told(OdometryErrors { speed_scale: 0.01, ..none }), ["odometry with speed wrong by 1.0 %"]);
+        let wrong_map = OdometryErrors { lane_width_m: 0.2, has_no_rails: true, ..none };
+        assert_eq!(told(wrong_map), ["map with lane width wrong by 0.20 m, without guard rails"]);
+        let both = told(OdometryErrors { heading_rad: 1.0_f64.to_radians(), curvature_per_m: 1e-4, ..none });
+        assert_eq!(both, ["odometry with heading wrong by 1.0°", "map with wrong curvature"]);
     }
 }

@@ -93,6 +93,11 @@ pub(crate) fn breakable(expression: &str) -> Markup {
     html! { @for piece in expression.split_inclusive(ends_word) { (piece) wbr; } }
 }
 
+/// Returns a text in which no line ends between a number and its percent sign.
+pub(super) fn unbroken(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
+}
+
 /// Returns the heads of columns of text.
 pub fn text_heads(names: &[&str]) -> Markup {
     html! { @for name in names { @if name.is_empty() { td {} } @else { th { (name) } } } }
@@ -140,6 +145,11 @@ mod tests {
         assert_eq!(written.replace("<wbr>", "").replace("&gt;", ">").replace("&lt;", "<"), expression);
         // The style sheet leaves the pieces whole: `anywhere` would let a column be narrower than a word.
         assert!(STYLE.contains("\n.gates code { overflow-wrap: break-word; }\n"));
+    }
+
+    #[test]
+    fn no_line_ends_between_a_number_and_its_percent_sign() {
+        assert_eq!(unbroken("6 of 30 (20 %); at most 3 %"), "6 of 30 (20\u{a0}%); at most 3\u{a0}%");
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The critical moment of a film, and the moments of its encounter.
 
-use closecall_traffic::Time;
+use closecall_traffic::{Measured, Time};
 
 use super::Film;
 use closecall_scenarios::outcome::ReachedMoment;
+use closecall_simulation::CurrentMargins;
 
 /// Time by which the moment at which a recording opens may precede the critical moment.
 const A_LITTLE: Time = Time::from_ms(2_000);
@@ -16,7 +17,8 @@ impl Film {
     /// 2. in a recorded encounter: the time at which the rear vehicle crosses the lane marking
     /// 3. in a recorded lane change: the time of a critical metric, else the time at which another
     ///    vehicle is closest to the ego
-    /// 4. in a run: the time of the smallest time headway of the vehicle behind
+    /// 4. in a run: the time of the smallest time headway of the vehicle behind, else of the ego to the
+    ///    vehicle ahead
     /// 5. the end
     pub fn critical_moment(&self) -> Time {
         if let Some(collision) = self.worst_collision() {
@@ -28,8 +30,11 @@ impl Film {
         if self.outcome.is_none() {
             return self.closest_moment();
         }
-        let headways = self.frames.iter().filter_map(|frame| Some((frame.time, frame.margins.thw_rear_s.ok()?)));
-        let closest = headways.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(time, _)| time);
+        let smallest = |headway: fn(&CurrentMargins) -> Measured| {
+            let headways = self.frames.iter().filter_map(|frame| Some((frame.time, headway(&frame.margins).ok()?)));
+            headways.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(time, _)| time)
+        };
+        let closest = smallest(|margins| margins.thw_rear_s).or_else(|| smallest(|margins| margins.thw_front_s));
         closest.unwrap_or_else(|| self.end())
     }
 

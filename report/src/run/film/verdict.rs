@@ -71,10 +71,13 @@ impl Film {
         Some(format!("{collision}; smallest headway: {}", headways(outcome)))
     }
 
-    /// Returns the smallest headways, and since when the ego saw the vehicle behind.
-    pub(in crate::run) fn headways_and_sight(&self) -> Option<String> {
+    /// Returns the smallest headways, those of the baseline of a pair, and since when the ego saw the
+    /// vehicle behind.
+    pub(in crate::run) fn headways_and_sight(&self, baseline: Option<&Self>) -> Option<String> {
         let sight = self.sight().map_or(String::new(), |sight| format!(" {sight}"));
-        Some(format!("Smallest headway: {}.{sight}", headways(self.outcome.as_ref()?)))
+        let of_baseline = |film: &Self| Some(format!("; {}: {}", film.arm_label(), headways(film.outcome.as_ref()?)));
+        let compared = baseline.and_then(of_baseline).unwrap_or_default();
+        Some(format!("Smallest headway: {}{compared}.{sight}", headways(self.outcome.as_ref()?)))
     }
 
     /// Returns the actions of the system, and since when it saw the vehicle behind, as a line of a

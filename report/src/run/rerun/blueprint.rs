@@ -238,12 +238,16 @@ fn is_traffic(films: &[FilmContents]) -> bool {
     films.iter().all(|film| !film.has_states)
 }
 
-/// Returns a time axis over the longest of the films.
+/// Room for the half of a label at the end of a time axis, as a share of its length: 15 px of 500 px.
+const LABEL_ROOM: f64 = 0.03;
+
+/// Returns a time axis over the longest of the films, with room for the label of its last tick.
 fn whole_run(films: &[FilmContents]) -> TimeAxis {
     let start = films.iter().map(|film| film.span[0]).min().unwrap_or(Time::ZERO);
     let end = films.iter().map(|film| film.span[1]).max().unwrap_or(Time::ZERO);
+    let room = Time::from_s(LABEL_ROOM * (end - start).s());
     let boundary = |time: Time| TimeRangeBoundary::Absolute(TimeInt(time.ns()));
-    TimeAxis::new().with_view_range(TimeRange { start: boundary(start), end: boundary(end) })
+    TimeAxis::new().with_view_range(TimeRange { start: boundary(start), end: boundary(end + room) })
 }
 
 /// Returns the log. It shows the texts only: their colours and words make other columns redundant.

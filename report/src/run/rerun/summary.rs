@@ -66,13 +66,16 @@ fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
     let [without, with] = [baseline, tested].map(Film::sentence);
     let happened = |told: &Option<CausalSentence<'_>>| told.as_ref().map_or_else(String::new, CausalSentence::happened);
     let is_same = happened(&without) == happened(&with);
-    let _ = writeln!(page, "- **{}:** {}", baseline.arm_label(), happened(&without));
+    // Where no MIS is judged, the emergency brake is: the sentence about the arm under test ends with it.
+    let has_no_mis = tested.outcome.as_ref().is_some_and(|outcome| outcome.mis.is_err());
+    let braked = without.as_ref().filter(|_| has_no_mis).and_then(CausalSentence::emergency_braking);
+    let braked = braked.map_or_else(String::new, |braked| format!("; {braked}"));
+    let _ = writeln!(page, "- **{}:** {}{braked}", baseline.arm_label(), happened(&without));
     let reason = with.as_ref().map_or_else(String::new, CausalSentence::reason);
     let in_tested = if is_same { "the same".to_owned() } else { happened(&with) };
     let _ = writeln!(page, "- **{}:** {in_tested}; {reason}", tested.arm_label());
-    let without = baseline.outcome.as_ref().map_or_else(String::new, headways);
-    if let Some(line) = tested.headways_and_sight() {
-        let _ = writeln!(page, "- {line} Without it: {without}.");
+    if let Some(line) = tested.headways_and_sight(Some(baseline)) {
+        let _ = writeln!(page, "- {line}");
     }
 }
 
@@ -109,7 +112,7 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         }
         Some(sentence) => {
             let _ = writeln!(page, "- **{}:** {sentence}", film.arm_label());
-            if let Some(line) = film.headways_and_sight() {
+            if let Some(line) = film.headways_and_sight(None) {
                 let _ = writeln!(page, "- {line}");
             }
         }

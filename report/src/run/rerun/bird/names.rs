@@ -63,7 +63,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     // nearest others.
     let rank = |actor: &usize| match film.actors[*actor].part {
         Part::Ego => -2.0,
-        _ if frame.lead() == Some(*actor) || frame.follower() == Some(*actor) => -1.0,
+        _ if is_neighbour(frame, *actor) => -1.0,
         Part::Lead | Part::Rear => 0.0,
         Part::Other(_) | Part::Background => (frame.states[*actor].s_m - ego.s_m).abs(),
     };
@@ -72,9 +72,11 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let mut names: Vec<Name> = named
         .into_iter()
         .filter_map(|actor| {
-            let (state, label) = (&frame.states[actor], film.vehicle_label(actor));
+            let state = &frame.states[actor];
             let x_m = state.s_m - ego.s_m;
-            let is_shown = x_m > labelled_m[0] && x_m < labelled_m[1];
+            let is_inside = x_m > labelled_m[0] && x_m < labelled_m[1];
+            let is_shown = is_inside || is_neighbour(frame, actor);
+            let label = format!("{}{}", arrow(x_m, labelled_m), film.vehicle_label(actor));
             let is_above = actor != film.ego && (x_m < 0.0 || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m());
             let headway = if has_collided { String::new() } else { headway_of(frame, actor) };
             let moving = format!("{label} {:.1} m/s", state.speed_mps);
@@ -96,6 +98,23 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         placed.extend(of_row);
     }
     placed
+}
+
+/// Returns whether a vehicle is directly ahead of the ego or behind it. Such a vehicle has its name at the end of the
+/// labelled stretch if it is beyond it.
+fn is_neighbour(frame: &Frame, actor: usize) -> bool {
+    frame.lead() == Some(actor) || frame.follower() == Some(actor)
+}
+
+/// Returns an arrow to a vehicle beyond the labelled stretch, which begins a name.
+fn arrow(x_m: f64, [from_m, to_m]: [f64; 2]) -> &'static str {
+    if x_m <= from_m {
+        "← "
+    } else if x_m >= to_m {
+        "→ "
+    } else {
+        ""
+    }
 }
 
 /// Returns a label for each shown track that belongs to no vehicle. It lies below the road.
@@ -183,6 +202,11 @@ mod tests {
             assert!(ends[0][0] >= -20.0 - 1e-9 && ends[2][1] <= 60.0 + 1e-9, "{ends:?}");
             assert!(ends.windows(2).all(|pair| pair[0][1] <= pair[1][0] + 1e-9), "{ends:?}");
         }
+    }
+
+    #[test]
+    fn a_name_beyond_the_stretch_begins_with_an_arrow() {
+        assert_eq!([-35.0, -34.9, 74.9, 75.0].map(|x_m| arrow(x_m, [-35.0, 75.0])), ["← ", "", "", "→ "]);
     }
 
     #[test]

@@ -79,7 +79,7 @@ const FAILED: &str = "failed";
 
 /// A group of sensors.
 struct HealthRow {
-    /// Its row.
+    /// The name of its row.
     row: &'static str,
     /// Its health in a frame.
     health: fn(&Frame) -> Option<Health>,
@@ -89,32 +89,38 @@ struct HealthRow {
     groups: &'static [SensorGroup],
 }
 
-const HEALTH_ROWS: [HealthRow; 4] = [
+const HEALTH_ROWS: [HealthRow; 5] = [
     HealthRow {
-        row: "5_rear_radars",
+        row: "rear_radars",
         health: |frame| frame.radar_health,
         alarms: |_| Alarms::NONE,
         groups: &[SensorGroup::RearRadars],
     },
     HealthRow {
-        row: "5_rear_sensors",
+        row: "rear_sensors",
         health: |frame| frame.health.map(|health| health.rear),
         alarms: |frame| frame.alarms.rear,
         groups: &[SensorGroup::Rear, SensorGroup::RearRadars],
     },
     HealthRow {
-        row: "7_front_sensor",
+        row: "front_sensor",
         health: |frame| frame.health.map(|health| health.front),
         alarms: |frame| frame.alarms.front,
         groups: &[SensorGroup::Front],
     },
     HealthRow {
-        row: "7_side_sensors",
+        row: "side_sensors",
         health: |frame| frame.health.map(|health| health.surround),
         alarms: |frame| frame.alarms.surround,
         groups: &[SensorGroup::Surround],
     },
+    // The ego does not know the health of its odometry and map.
+    HealthRow { row: "odometry_and_map", health: |_| None, alarms: |_| Alarms::NONE, groups: &[SensorGroup::Odometry] },
 ];
+/// Numbers of the rows of sensors that have a fault at any time, and of all others. A fault is often the cause of what
+/// follows, so its row lies beside the row of the reasons, where every window shows it.
+const FAULTY_ROW: u8 = 2;
+const HEALTHY_ROW: u8 = 7;
 
 const BRAKING: [Word<'static>; 2] =
     [Word::new(BRAKES, BRAKES, palette::BRAKE_LIGHT), Word::new(DRIVES, DRIVES, palette::QUIET)];
@@ -180,6 +186,34 @@ const fn short_reason(reason: Reason) -> &'static str {
     }
 }
 
+/// Returns the text of a very short bar of a reason.
+const fn shortest_reason(reason: Reason) -> &'static str {
+    match reason {
+        Reason::NoMis => "off",
+        Reason::NotAutomated => "man.",
+        Reason::FrontSensorFailed | Reason::SurroundSensorsFailed | Reason::RearSensorsFailed => "n/a",
+        Reason::NoFront | Reason::NoRear => "none",
+        Reason::FrontMarginLong => "long",
+        Reason::RearUnconfirmed | Reason::RearUnclassified => "new",
+        Reason::RearFar => "far",
+        Reason::RearNotApproaching => "slow",
+        Reason::NoPassingLane | Reason::PassingLaneOccupied | Reason::PassingLaneUnknown => "lane",
+        Reason::RearFollowed => "next",
+        Reason::Engaged | Reason::EngagedGoalOutOfReach => "MIS",
+        Reason::RearCrosses | Reason::RearChangedLane => "left",
+        Reason::CriticalDistance => "crit",
+        Reason::RearPassed => "past",
+        Reason::RearFellBack => "back",
+        Reason::RearFollows => "foll",
+        Reason::RearLost | Reason::FrontLost => "lost",
+        Reason::HoldExpired => "time",
+        Reason::NoRoomToHold => "room",
+        Reason::MarginReturned => "ret.",
+        Reason::BrakingRequired | Reason::BrakingDone => "AEB",
+        Reason::External => "own",
+    }
+}
+
 /// Letters of a word that says little alone, such as *no*.
 const SHORT_WORD: usize = 3;
 
@@ -205,10 +239,11 @@ fn shortest_health(text: &str) -> &'static str {
 }
 
 /// Returns the name of an arm as the last part of the path of a row. The viewer shows the path, and
-/// writes a backslash before every other character.
+/// writes a backslash before every other character. A plus becomes a word, as `acc+aeb` and `acc-aeb`
+/// can be the two arms of a pair.
 fn row_name(arm: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || matches!(letter, '-' | '.' | '_');
-    arm.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect()
+    arm.replace('+', "_with_").chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect()
 }
 
 impl Plots<'_> {
@@ -256,7 +291,10 @@ impl Plots<'_> {
         };
         let short = |frame: &Frame| frame.command.map_or("", |command| short_reason(command.reason));
         let frames = self.film.frames.iter().zip(&words);
-        let states: Vec<Word<'_>> = frames.map(|(frame, text)| Word::new(text, short(frame), colour(frame))).collect();
+        let shortest = |frame: &Frame| frame.command.map_or("", |command| shortest_reason(command.reason));
+        let states: Vec<Word<'_>> = frames
+            .map(|(frame, text)| Word::new(text, short(frame), colour(frame)).with_shortest(shortest(frame)))
+            .collect();
         self.band("2_reason", &words, &states)
     }
 
@@ -282,19 +320,21 @@ impl Plots<'_> {
         let states = (0..texts.len()).map(|index| {
             Word::new(&until[index], &arrows_until[index], palette::CRITICAL).with_shortest(&arrows[index])
         });
-        let none = Word::new(&before, &arrows_until[arrows_until.len() - 1], palette::QUIET).with_shortest(BEFORE);
+        let then = format!("then {}", arrows_until[arrows_until.len() - 1]);
+        let none = Word::new(&before, &then, palette::QUIET).with_shortest(BEFORE);
         self.band("4_collisions", &words, &states.chain([none]).collect::<Vec<_>>())
     }
 
-    /// Writes a band for each group of sensors that exists: its health as the ego knows it, with the
-    /// reasons, and injected faults that the ego has not noticed. The arms of a pair have the same sensors, so the baseline
-    /// writes none.
+    /// Writes a band for each group of sensors that exists, and for odometry and map if they have a fault: its health as
+    /// the ego knows it, with the reasons, and injected faults that the ego has not noticed. The arms of a pair have the
+    /// same sensors, so the baseline writes none.
     fn health(&self) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
         }
         for HealthRow { row, health, alarms, groups } in HEALTH_ROWS {
-            if self.film.frames.iter().all(|frame| health(frame).is_none()) {
+            let has_fault = self.film.faults.iter().any(|fault| groups.contains(&fault.group));
+            if !has_fault && self.film.frames.iter().all(|frame| health(frame).is_none()) {
                 continue;
             }
             let text = |frame: &Frame| {
@@ -325,7 +365,8 @@ impl Plots<'_> {
                         .with_shortest(shortest_health(words[row]))
                 })
                 .collect();
-            self.band(row, &words, &states)?;
+            let number = if words.iter().all(|&word| word == HEALTHY) { HEALTHY_ROW } else { FAULTY_ROW };
+            self.band(&format!("{number}_{row}"), &words, &states)?;
         }
         Ok(())
     }
@@ -419,7 +460,8 @@ mod tests {
     #[test]
     fn a_row_name_has_no_character_that_the_viewer_escapes() {
         assert_eq!(row_name("with MIS"), "with_MIS");
-        assert_eq!(row_name("acc+aeb"), "acc_aeb");
+        assert_eq!(row_name("acc+aeb"), "acc_with_aeb");
+        assert_eq!(row_name("acc-aeb"), "acc-aeb");
         assert_eq!(row_name("gap-1.6"), "gap-1.6");
         assert_eq!(row_name("lib:own/é.so"), "lib_own_é.so");
     }

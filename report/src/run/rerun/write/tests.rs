@@ -287,16 +287,16 @@ fn rear_radars_have_points_with_radial_speeds_and_ghosts_are_no_vehicles() {
         assert_eq!(units, ["m/s"], "{side}");
     }
     let has = |data: &[Chunk], entity: &str| data.iter().any(|chunk| chunk.entity_path().to_string() == entity);
-    assert!(has(&data, "/states/5_rear_radars/with_MIS"));
+    assert!(has(&data, "/states/7_rear_radars/with_MIS"), "their ghosts are no fault");
     let without = chunks(&[filmed_with("")], StoreKind::Recording);
-    assert!(!has(&without, "/states/5_rear_radars/with_MIS") && !has(&without, "/mis/world/ego/radars/left"));
+    assert!(!has(&without, "/states/7_rear_radars/with_MIS") && !has(&without, "/mis/world/ego/radars/left"));
 }
 
 #[test]
 fn the_states_name_the_fault_of_a_radar_and_when_the_ego_notices_it() {
     let radar = "sensors.rear-radar = {}\n[[fault.rear-radar]]\nside = \"left\"\ndead = true\nfrom-s = 1.0\n";
     let data = chunks(&[filmed_with(radar)], StoreKind::Recording);
-    let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/5_rear_radars/with_MIS");
+    let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/2_rear_radars/with_MIS");
     let states: Vec<String> = rows.flat_map(|chunk| texts(chunk, "StateChange:state")).collect();
     let states: Vec<&str> = states.iter().filter(|state| !state.is_empty()).map(String::as_str).collect();
     let fault = "rear radar `left` dead";
@@ -310,7 +310,7 @@ fn the_states_name_the_fault_of_a_radar_and_when_the_ego_notices_it() {
 #[test]
 fn the_states_give_the_reason_for_which_a_sensor_is_degraded() {
     let data = chunks(&[filmed_with("[[fault.rear-lidar]]\ndelay-s = 0.2\nfrom-s = 1.0\n")], StoreKind::Recording);
-    let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/5_rear_sensors/with_MIS");
+    let rows = data.iter().filter(|chunk| chunk.entity_path().to_string() == "/states/2_rear_sensors/with_MIS");
     let states: Vec<String> = rows.flat_map(|chunk| texts(chunk, "StateChange:state")).collect();
     let states: Vec<&str> = states.iter().filter(|state| !state.is_empty()).map(String::as_str).collect();
     let fault = "rear LiDAR late by 0.20 s";
@@ -493,6 +493,17 @@ fn both_halves_of_a_pair_open_at_the_same_moment() {
 }
 
 #[test]
+fn without_a_vehicle_behind_the_smallest_front_headway_is_the_critical_moment() {
+    let film = filmed("acc/acc-lead-slows", ControllerChoice::ACC, (None, Level::Events));
+    assert!(film.worst_collision().is_none() && film.frames.iter().all(|frame| frame.margins.thw_rear_s.is_err()));
+    let headways_s = film.frames.iter().filter_map(|frame| frame.margins.thw_front_s.ok());
+    let smallest_s = headways_s.reduce(f64::min).unwrap();
+    let critical = film.critical_moment();
+    let shown_s = film.frame_at(critical).unwrap().margins.thw_front_s.unwrap();
+    assert!(shown_s <= smallest_s && critical < film.end(), "{shown_s} s at {critical:?}, smallest {smallest_s} s");
+}
+
+#[test]
 fn a_half_that_ends_shortly_before_the_critical_moment_sets_the_moment_of_both() {
     let film = filmed("overtake-without-brake", ControllerChoice::MIS, (None, Level::Objects));
     assert!(film.worst_collision().is_none());
@@ -520,8 +531,9 @@ fn a_half_that_ends_shortly_before_the_critical_moment_sets_the_moment_of_both()
 fn a_fault_is_in_the_verdict_and_in_the_states_of_its_sensor() {
     let film = |name| filmed(name, ControllerChoice::MIS, (None, Level::Events));
     for (fault, words, row) in [
-        ("faults/lidar-dead", "rear LiDAR dead", "5_rear_sensors"),
-        ("faults/front-radar-ghost", "a vehicle that does not exist", "7_front_sensor"),
+        ("faults/lidar-dead", "rear LiDAR dead", "2_rear_sensors"),
+        ("faults/front-radar-ghost", "a vehicle that does not exist", "2_front_sensor"),
+        ("faults/map-curvature", "map with wrong curvature", "2_odometry_and_map"),
     ] {
         let films = [film(fault)];
         let verdict = summary::verdict(&films);
@@ -555,7 +567,8 @@ fn the_verdict_on_a_pair_is_its_first_word() {
     assert!(text.contains(" s after F braked"), "{text}");
     assert!(text.contains("- **with MIS: no vehicle collided; F braked at "), "{text}");
     assert!(text.contains("; the MIS engaged for R at ") && text.contains("; faults: none**\n"), "{text}");
-    assert!(text.contains("- **Smallest headway: front "), "{text}");
+    let headways = text.lines().find(|line| line.starts_with("- **Smallest headway: front ")).unwrap();
+    assert!(headways.contains("; without MIS: front "), "{headways}");
 }
 
 #[test]
