@@ -81,8 +81,13 @@ const style = () => {
   const css = getComputedStyle(document.documentElement), of = name => css.getPropertyValue(name).trim();
   return { ink: of('--ink'), soft: of('--soft'), line: of('--line'), sheet: of('--sheet'), link: of('--link') };
 };
+// The points at the ends of a column lie inside its axis.
+const roomy = one => {
+  const [low, high] = ends(one), room = one.words ? 0 : 0.02 * (high - low);
+  return [low - room, high + room];
+};
 const axis = (one, colours) => ({
-  title: { text: one.label, standoff: 6 }, range: ends(one), automargin: true, gridcolor: colours.line, zeroline: false,
+  title: { text: one.label, standoff: 6 }, range: roomy(one), automargin: true, gridcolor: colours.line, zeroline: false,
   linecolor: colours.soft, fixedrange: true,
   ...(one.words ? { tickvals: one.words.map((_, index) => index), ticktext: one.words.map(word => word.length > 24 ? word.slice(0, 23) + '…' : word) } : {}),
 });
@@ -182,11 +187,13 @@ const list = () => {
   byId('list').replaceChildren(made('p', { className: 'note' }, counted), made('div', { className: 'wide', tabIndex: 0 }, made('table', {}, made('thead', {}, head), made('tbody', {}, ...rows))));
 };
 
-// Draws all charts but `except`, in which the pointer draws a brush.
-const update = except => {
+// Draws all charts but `except`, in which the pointer draws a brush. At the end of a brush the others show it already: `only` is left.
+const update = (except, only) => {
   const start = performance.now();
   select();
-  const drawn = panels.filter(panel => panel !== except).map(panel => panel.y ? drawPlane(panel) : drawHistogram(panel));
+  const changed = only ? [only] : panels.filter(panel => panel !== except);
+  const drawn = changed.map(panel => panel.y ? drawPlane(panel) : drawHistogram(panel));
+  for (const panel of panels) if (!only) panel.shown = panel === except ? JSON.stringify(panel.brush) : null;
   if (!except) list();
   for (const panel of panels) {
     panel.clear.hidden = !panel.brush.length;
@@ -214,12 +221,14 @@ const told = (columns, row) => {
     const one = columns.find(column => column.name === name);
     return one && !Number.isNaN(one.values[row]) ? valueText(one, row) : null;
   };
-  if (of('duration_s') === null) return 'no outcome';
+  const isKnown = column => !Number.isNaN(column.values[row]);
+  if (!columns.some(isKnown)) return 'no outcome';
+  const hasCollided = columns.some(column => column.name.startsWith('collision_') && isKnown(column));
   const [first, second, closed] = ['first', 'second'].map(which => of(`collision_between_${which}`)).concat(of('collision_closed_by'));
   const [striking, struck] = closed === 'second' ? [second, first] : [first, second];
-  const parts = [first === null || second === null ? 'no collision' : closed === 'first' || closed === 'second' ? `${striking} struck ${struck}` : `${first} and ${second} collided`];
+  const parts = [!hasCollided ? 'no collision' : first === null || second === null ? 'collision' : closed === 'first' || closed === 'second' ? `${striking} struck ${struck}` : `${first} and ${second} collided`];
   for (const [word, name, unit] of [['at', 'collision_relative_speed_mps', ' m/s'], ['at', 'collision_time_s', ' s']])
-    if (of(name) !== null && first !== null) parts[0] += ` ${word} ${of(name)}${unit}`;
+    if (of(name) !== null) parts[0] += ` ${word} ${of(name)}${unit}`;
   for (const [word, name] of [['reason of the MIS', 'mis_reason'], ['cause', 'cause']]) if (of(name) !== null) parts.push(`${word}: ${of(name)}`);
   return parts.join('; ');
 };
@@ -312,11 +321,18 @@ const watch = panel => {
     if (isWaiting || !event?.range) return;
     isWaiting = true;
     requestAnimationFrame(() => {
-      if (panel.isDrawn) setBrush(panel, event.range);
+      // The end of the brush has drawn all.
+      if (!panel.isDrawn) { isWaiting = false; return; }
+      setBrush(panel, event.range);
       update(panel).finally(() => { isWaiting = false; });
     });
   });
-  panel.chart.on('plotly_selected', event => { if (panel.isDrawn && event?.range) { setBrush(panel, event.range); panel.isDrawn = false; } update(); });
+  panel.chart.on('plotly_selected', event => {
+    // It comes a second time when the brush has been drawn.
+    const isEnd = panel.isDrawn && event?.range;
+    if (isEnd) { setBrush(panel, event.range); panel.isDrawn = false; }
+    update(undefined, !isEnd || panel.shown === JSON.stringify(panel.brush) ? panel : undefined);
+  });
   panel.chart.on('plotly_click', event => { const row = event.points.find(point => point.customdata !== undefined)?.customdata; if (row !== undefined) show(row); });
   panel.chart.on('plotly_doubleclick', () => { clearBrush(panel); update(); });
 };

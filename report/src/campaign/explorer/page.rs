@@ -10,6 +10,7 @@ use closecall_campaign::folder::{FolderError, RECORDINGS, RECORDINGS_PAGE, REPOR
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::input::read_text;
+use closecall_traffic::words::counted;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -27,6 +28,8 @@ use crate::escape::from_markdown;
 /// The page's own style and script. The script filters, counts and links; Plotly draws.
 const OWN_STYLE: &str = include_str!("explorer.css");
 const SCRIPT: &str = include_str!("explorer.js");
+/// Largest number of scenarios whose names are in the title.
+const NAMED: usize = 3;
 /// Number of histograms.
 const HISTOGRAMS: usize = 4;
 /// The sample number in a command. The page replaces it by the number of the chosen sample.
@@ -127,7 +130,8 @@ pub fn explorer_page(saved: &SavedCampaign, place: &PagePlace, command_for: Comm
         data: data.map_err(|error| written(saved, error))?,
         plotly: script.map_err(|error| written(saved, error))?,
     };
-    let title = files.iter().map(|file| file.config().name.as_str()).collect::<Vec<_>>().join(", ");
+    let names: Vec<&str> = files.iter().map(|file| file.config().name.as_str()).collect();
+    let title = if names.len() > NAMED { counted(names.len(), "scenario") } else { names.join(", ") };
     Ok(page(&title, saved, place, unfinished.as_ref(), &packed).into_string())
 }
 
@@ -225,7 +229,7 @@ fn page(
                             }
                         }
                     }
-                    (filters(saved))
+                    (filters(saved, verdict.as_deref()))
                     div.views {
                         div.charts-side {
                             (plane("map", "Outcome map: share of samples with a collision, and samples"))
@@ -251,11 +255,24 @@ fn page(
     }
 }
 
-fn filters(saved: &SavedCampaign) -> Markup {
+/// Returns the scenario that a verdict names first: the worst one.
+fn first_named<'a>(names: impl Iterator<Item = &'a str>, verdict: &str) -> Option<&'a str> {
+    let names: Vec<&str> = names.collect();
+    let mut words = verdict.split([' ', ',']);
+    words.find_map(|word| names.iter().copied().find(|name| *name == word))
+}
+
+/// Returns the filters. The page opens with the scenario that the verdict names first.
+fn filters(saved: &SavedCampaign, verdict: Option<&str>) -> Markup {
     let manifest = saved.manifest();
+    let names = || manifest.scenarios.iter().map(|scenario| scenario.name.as_str());
+    let first = verdict.and_then(|verdict| first_named(names(), verdict));
     html! {
         form.filters id="filters" aria-label="Filters" {
-            label { "Scenario " select name="scenario" { @for scenario in &manifest.scenarios { option { (scenario.name) } } } }
+            label {
+                "Scenario "
+                select name="scenario" { @for name in names() { option selected[Some(name) == first] { (name) } } }
+            }
             label {
                 "Arm " select name="arm" {
                     @for (index, name) in manifest.arm_names().iter().enumerate() {
@@ -298,5 +315,19 @@ fn histogram(index: usize) -> Markup {
             }
             div.chart role="img" aria-label={ "Histogram " (index + 1) } {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_opens_with_the_scenario_that_the_verdict_names_first() {
+        let names = ["overtake", "overtake-fast", "lead"];
+        let first = |verdict| first_named(names.into_iter(), verdict);
+        let fail = "FAIL: 2 of 3 scenarios miss a requirement: overtake-fast (MIS-3), lead (MIS-1)";
+        assert_eq!(first(fail), Some("overtake-fast"), "not the one whose name is a part of it");
+        assert_eq!(first("PASS: all requirements of 3 scenarios are met"), None);
     }
 }
