@@ -16,7 +16,7 @@ use serde_json::json;
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{outln, print_text, print_written};
+use super::output::{outln, print_text, print_written, textln};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall baseline`.
@@ -83,7 +83,7 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
     for (name, scenario) in &baseline.scenarios {
         let samples = counted(scenario.samples, "sample");
         let (collisions, errors) = (counted(scenario.collisions, "collision"), counted(scenario.errors, "error"));
-        outln!("{name}: {samples}, {collisions}, {errors}");
+        textln!("{name}: {samples}, {collisions}, {errors}");
     }
     print_written(file);
     Ok(ExitCode::Pass)

@@ -29,7 +29,7 @@ use super::actions::command_for;
 use super::advice::to_provide;
 use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
-use super::output::{during, outln, print_error, print_text, print_written};
+use super::output::{during, outln, print_error, print_text, print_written, textln};
 use super::protect::{of_campaign, protect};
 use super::saved::SavedArgs;
 use crate::exit_code::ExitCode;
@@ -81,12 +81,12 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
             outln!("{:#}", stamped(json!(explanation), Some(explanation.seed), None))
         }
         (Format::Json, ..) => outln!("{:#}", stamped(json!(explanations), None, None)),
-        (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
+        (Format::Human, _, []) => textln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
             for explanation in &explanations {
                 print_text(format_args!("{}\n", ExplanationText { explanation, folder: &args.dir, command_for }));
             }
-            outln!("{LETTERS}");
+            textln!("{LETTERS}");
         }
     }
     Ok(ExitCode::Pass)

@@ -17,7 +17,7 @@ use super::CliError;
 use super::actions::command_for;
 use super::args::{FittedArgs, Format, SetArgs};
 use super::help::{examples, heading};
-use super::output::{outln, print_error, print_failure};
+use super::output::{outln, print_error, print_failure, textln};
 use super::saved::refuse_rare;
 use super::watching::{WatchingArgs, watch};
 use crate::exit_code::ExitCode;
@@ -142,7 +142,7 @@ fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
                     outln!("{}{line}: {message}\n  repair: {repair}", path.join(file).display());
                 }
                 if integrity.is_sound() {
-                    outln!("{}: sound, {}", path.display(), counted(integrity.records, "sample"));
+                    textln!("{}: sound, {}", path.display(), counted(integrity.records, "sample"));
                 }
             }
         }
@@ -154,7 +154,7 @@ fn print(file: Result<ScenarioFile, ScenarioError>, path: &Path) {
     match file {
         Ok(file) => {
             let count = file.space().iter().len();
-            outln!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
+            textln!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
         }
         Err(error) => print_failure(error.into()),
     }

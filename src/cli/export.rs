@@ -15,7 +15,7 @@ use super::args::{SensorsChoice, SetArgs};
 use super::arms::ControllerArgs;
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::{outln, print_written};
+use super::output::{print_written, textln};
 use super::protect::{of_campaign, of_controller, of_scenario, protect};
 use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
@@ -122,8 +122,8 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     write_case(&args.output, &files)?;
     files.files.iter().for_each(|(name, _)| print_written(&args.output.join(name)));
     for (form, unsaid) in &files.unsaid {
-        outln!("{}: not said in the file:", form.name());
-        unsaid.iter().for_each(|statement| outln!("  {statement}"));
+        textln!("{}: not said in the file:", form.name());
+        unsaid.iter().for_each(|statement| textln!("  {statement}"));
     }
     Ok(ExitCode::Pass)
 }

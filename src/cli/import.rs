@@ -8,7 +8,7 @@ use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::help::{examples, heading};
-use super::output::{command_line, outln, print_written};
+use super::output::{command_line, print_written, textln};
 use super::protect::protect;
 use crate::exit_code::ExitCode;
 
@@ -63,12 +63,12 @@ pub(super) fn import_file(args: &ImportArgs) -> Result<ExitCode, CliError> {
     write_file(&args.output, |file| write!(file, "# Made by `{}`\n{}", command_line(), imported.text))?;
     print_written(&args.output);
     if !imported.notes.is_empty() {
-        outln!("said in another way than in {}:", args.file.display());
-        imported.notes.iter().for_each(|note| outln!("  {note}"));
+        textln!("said in another way than in {}:", args.file.display());
+        imported.notes.iter().for_each(|note| textln!("  {note}"));
     }
     if !imported.events.is_empty() {
-        outln!("events, if the ego keeps the speed of the file:");
-        imported.events.iter().for_each(|(time_s, event)| outln!("  {time_s:7.2} s  {event}"));
+        textln!("events, if the ego keeps the speed of the file:");
+        imported.events.iter().for_each(|(time_s, event)| textln!("  {time_s:7.2} s  {event}"));
     }
     Ok(ExitCode::Pass)
 }

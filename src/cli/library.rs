@@ -9,7 +9,7 @@ use serde_json::json;
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
-use super::output::{outln, print_text};
+use super::output::{outln, print_text, textln};
 use super::terminal::{cut, output_columns};
 use crate::exit_code::ExitCode;
 
@@ -51,7 +51,7 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
         (Format::Human, None) => Overview::of(&listed).print(),
         (Format::Human, Some(MEMBERS)) => {
             members.iter().for_each(|member| print_text(format_args!("{}\n", member.to_string().trim_end())));
-            outln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
+            textln!("\nAn ensemble takes such a name: `closecall campaign SCENARIO --ensemble NAME`.");
         }
         (Format::Human, Some(what)) => {
             let is_meant = |entry: &&LibraryEntry| match what {

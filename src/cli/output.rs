@@ -172,4 +172,9 @@ macro_rules! outln {
     ($($part:tt)*) => { $crate::cli::output::print(format_args!("{}\n", format_args!($($part)*))) };
 }
 
-pub(super) use {out, outln};
+/// Prints a line for people: wrapped at words on a terminal, as it is into a pipe.
+macro_rules! textln {
+    ($($part:tt)*) => { $crate::cli::output::print_text(format_args!("{}\n", format_args!($($part)*))) };
+}
+
+pub(super) use {out, outln, textln};

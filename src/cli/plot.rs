@@ -16,7 +16,7 @@ use super::args::SetArgs;
 use super::arms::{ArmArgs, ComparisonArgs};
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::{during, outln, print_written};
+use super::output::{during, print_written, textln};
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
 use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
@@ -64,7 +64,7 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
     let films = if args.source.is_dir() { of_campaign(args)? } else { of_scenario(args)? };
     args.output.write(&encounter(&films), args.width_mm)?;
     for film in &films {
-        outln!("{}: {}", film.title(), film.headline());
+        textln!("{}: {}", film.title(), film.headline());
     }
     print_written(args.output.path());
     Ok(ExitCode::Pass)

@@ -40,7 +40,7 @@ use super::args::Format;
 use super::backend::{check_backend, check_networks};
 use super::campaign::progress_bar;
 use super::help::heading;
-use super::output::{heartbeat, outln, print_error, print_text, print_written};
+use super::output::{heartbeat, outln, print_error, print_text, print_written, textln};
 use crate::exit_code::ExitCode;
 
 /// Largest number of runs of each scenario, unless another one is named: of an estimate, and of a
@@ -246,9 +246,9 @@ impl Rare<'_> {
             Format::Json => outln!("{result:#}"),
             Format::Human => {
                 self.print(reports, works, manifest.sensors);
-                remark.iter().for_each(|remark| outln!("  {remark}"));
+                remark.iter().for_each(|remark| textln!("  {remark}"));
                 if manifest.has_drawn_seed {
-                    outln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
+                    textln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
                 }
             }
         }
@@ -265,9 +265,9 @@ impl Rare<'_> {
             }
             Format::Human => {
                 for (scenario, runs) in runs {
-                    outln!("{scenario}: part {part} of a campaign by {}, {}", self.method, counted(*runs, "run"));
+                    textln!("{scenario}: part {part} of a campaign by {}, {}", self.method, counted(*runs, "run"));
                 }
-                outln!("  no estimate: `closecall tool merge` makes it of all parts");
+                textln!("  no estimate: `closecall tool merge` makes it of all parts");
             }
         }
     }
@@ -290,10 +290,10 @@ impl Rare<'_> {
         match (self.format, resume) {
             (Format::Json, resume) => outln!("{:#}", json!({ "ended_early": signal, "runs": runs, "resume": resume })),
             (Format::Human, resume) => {
-                outln!("ENDED EARLY, without a result: {signal}; runs that are done: {runs}");
+                textln!("ENDED EARLY, without a result: {signal}; runs that are done: {runs}");
                 match resume {
                     Some(command) => outln!("resume: {command}"),
-                    None => outln!("nothing was kept: only a campaign with a folder (--out DIR) can be resumed"),
+                    None => textln!("nothing was kept: only a campaign with a folder (--out DIR) can be resumed"),
                 }
             }
         }
@@ -365,8 +365,8 @@ impl Rare<'_> {
         let Some(minimized) = minimize(&case)? else { return Ok(()) };
         let Some(folder) = self.folder else {
             if self.format == Format::Human {
-                outln!("  smallest case: {}", minimized.sentence);
-                outln!("  --out DIR keeps it as a scenario file");
+                textln!("  smallest case: {}", minimized.sentence);
+                textln!("  --out DIR keeps it as a scenario file");
             }
             return Ok(());
         };
@@ -391,11 +391,11 @@ impl Rare<'_> {
                 let verdict = self.word(report);
                 let (max, confidence) = (gate.max(), percent(gate.confidence()));
                 if let Some(bound) = report.upper_bound(gate.confidence()).filter(|_| report.is_doubtful()) {
-                    outln!(
+                    textln!(
                         "  judged by an upper bound that holds for any weights, because the estimate is doubtful: {bound:.3e}"
                     );
                 }
-                outln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
+                textln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
             }
             // No command line repeats a run of a controller from outside, of standard input, or of
             // a member of an ensemble.

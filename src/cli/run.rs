@@ -17,7 +17,7 @@ use super::CliError;
 use super::args::{FittedArgs, Format, SimulationArgs};
 use super::arms::ComparisonArgs;
 use super::help::{examples, heading};
-use super::output::{outln, print_text};
+use super::output::{outln, print_text, textln};
 use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
 use crate::exit_code::ExitCode;
@@ -84,7 +84,7 @@ pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome],
                 let sentence = causal_sentence(scenario, arm.sensors, outcome);
                 print_text(OutcomeText { outcome, sentence: &sentence, letters: &letters });
             }
-            outln!("{LETTERS}");
+            textln!("{LETTERS}");
         }
     }
 }

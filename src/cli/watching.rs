@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::{FittedArgs, SetArgs};
 use super::arms::{ArmArgs, ComparisonArgs};
 use super::help::heading;
-use super::output::{outln, print_error, print_failure};
+use super::output::{outln, print_error, print_failure, textln};
 use crate::exit_code::ExitCode;
 
 /// Time between two looks at the file.
@@ -101,7 +101,7 @@ fn round(path: &Path, (set, fitted): (&SetArgs, &FittedArgs), args: &WatchingArg
     let (set, of_arms) = set.by_arm();
     let file = fitted.load(path, &set)?;
     let (name, parameters) = (&file.config().name, file.space().iter().len());
-    outln!("{}: valid, {name} with {parameters} parameters", path.display());
+    textln!("{}: valid, {name} with {parameters} parameters", path.display());
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
     let arms = args.comparison.arms(&args.arm, &file, &of_arms)?;
     for sample in 0..args.samples {
@@ -110,7 +110,7 @@ fn round(path: &Path, (set, fitted): (&SetArgs, &FittedArgs), args: &WatchingArg
         for arm in &arms {
             let key = RunKey { seed: args.seed, sample };
             let outcome = run_guarded(&scenario, key, arm, &mut NoObserver).map_err(fail)?;
-            outln!("  {}", outcome_line(&outcome));
+            textln!("  {}", outcome_line(&outcome));
         }
     }
     Ok(())
