@@ -33,6 +33,8 @@ const CAPITAL: f64 = 0.73;
 const PLOT_PX: [f64; 2] = [380.0, 150.0];
 const FONT_PX: f64 = 12.0;
 const MARGIN_PX: f64 = 26.0;
+/// Base line of the title of a plot of headways (px): above the plot, which begins at half the margin.
+const TITLE_BASE_PX: f64 = 10.0;
 /// Upper end of the axis of headways (s).
 const MOST_THW_S: f64 = 4.0;
 const CRITICAL: &str = "#c40018";
@@ -197,13 +199,14 @@ fn headways(film: &Film, window: Window) -> Markup {
                 line x1=(left) x2=(right) y1=(format!("{:.1}", y(thw_s))) y2=(format!("{:.1}", y(thw_s))) stroke="#dfe4ea" {}
                 text x="20" y=(format!("{:.1}", y(thw_s) + 4.0)) font-size=(FONT_PX) text-anchor="end" fill="#55606d" { (format!("{thw_s:.0}")) }
             }
+            text x=(left) y=(TITLE_BASE_PX) font-size=(FONT_PX) fill="#55606d" { "time headway [s]" }
             line x1=(left) x2=(right) y1=(format!("{:.1}", y(CRITICAL_THW_S))) y2=(format!("{:.1}", y(CRITICAL_THW_S))) stroke=(CRITICAL) stroke-dasharray="4 3" {}
             path fill="none" stroke=(FRONT) stroke-width="2" d=(curve(|frame| (frame.lead(), frame.margins.thw_front_s))) {}
             path fill="none" stroke=(REAR) stroke-width="2" d=(curve(|frame| (frame.follower(), frame.margins.thw_rear_s))) {}
             @for time in shown {
-                line x1=(format!("{:.0}", x(time))) x2=(format!("{:.0}", x(time))) y1="8" y2=(height - MARGIN_PX) stroke=(CRITICAL) stroke-width="2" {}
+                line x1=(format!("{:.0}", x(time))) x2=(format!("{:.0}", x(time))) y1=(0.5 * MARGIN_PX) y2=(height - MARGIN_PX) stroke=(CRITICAL) stroke-width="2" {}
             }
-            line x1=(left) x2=(left) y1="8" y2=(height - MARGIN_PX) stroke="#1d242c" {
+            line x1=(left) x2=(left) y1=(0.5 * MARGIN_PX) y2=(height - MARGIN_PX) stroke="#1d242c" {
                 @for end in ["x1", "x2"] {
                     animate attributeName=(end) from=(left) to=(right) dur=(window.duration()) repeatCount="indefinite" {}
                 }

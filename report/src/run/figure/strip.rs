@@ -223,6 +223,12 @@ impl Strip<'_> {
                 Area { left, top, width, height }
             })
         });
+        // In the left lane there may be room only ahead of the body, or behind it.
+        let top = body.top + 0.5 * (body.height - height);
+        let beside =
+            [body.right() + BESIDE_PX, body.left - BESIDE_PX - width].map(|left| Area { left, top, width, height });
+        let fits = |place: &Area| place.left >= self.area.left && place.right() <= self.area.right();
+        let places = places.chain(beside.into_iter().filter(fits));
         places.filter(|place| place.top >= self.area.top && place.bottom() <= self.area.bottom()).collect()
     }
 

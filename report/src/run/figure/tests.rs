@@ -147,6 +147,23 @@ fn a_vehicle_outside_of_the_picture_has_no_label() {
 }
 
 #[test]
+fn a_vehicle_in_the_left_lane_has_its_label_beside_it_if_there_is_room_nowhere_else() {
+    let mut films = films("rear-vehicles-one-after-another", &[ControllerChoice::MIS]);
+    let film = &mut films[0];
+    let [rear, lead] =
+        [Part::Rear, Part::Lead].map(|part| film.actors.iter().position(|actor| actor.part == part).unwrap());
+    let ego = film.frames[0].states[film.ego];
+    let left_m = film.road.lane_centre_m(closecall_traffic::Lane(1));
+    let states = &mut film.frames[0].states;
+    (states[lead].s_m, states[rear].s_m, states[rear].d_m) = (ego.s_m + 20.0, ego.s_m + 24.0, left_m);
+    let mut svg = svg::Svg::new([360.0, 120.0]);
+    let area = svg::Area { left: 8.0, top: 8.0, width: 344.0, height: 100.0 };
+    strip::draw(&mut svg, (film, None), 0, (area, [-38.0, 70.0]));
+    let text = svg.finish();
+    assert!(text.contains(">F front ") && text.contains(">R rear "), "{text}");
+}
+
+#[test]
 fn from_above_only_ego_lead_and_rear_vehicle_and_vehicles_that_collide_are_named() {
     let films = films("rear-vehicles-one-after-another", &[ControllerChoice::ACC]);
     let film = &films[0];
