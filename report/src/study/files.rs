@@ -21,7 +21,7 @@ use super::boundary::{
     BoundaryText, about, cells as boundary_cells, charts as boundary_charts, heads as boundary_heads, ranges,
     statements, verdict,
 };
-use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, others, short};
+use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, others, short, without_collisions};
 use super::sensitivity::{SensitivityText, conclusion};
 use super::tornado::charts as tornado_charts;
 use crate::campaign::html::page::{document, head, number, table, text_heads};
@@ -228,10 +228,12 @@ fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
     let body = html! {
         (head(&title, &frontier.settings, &about))
         (errors(&frontier.errors, "runs"))
-        p.note {
-            "Marked combinations are Pareto-optimal: no other one prevents more, induces less or loses less speed without being worse "
-            "in another of the three. All combinations run the same samples. Lines are 95 % intervals. Overlapping "
-            "intervals do not tell two combinations apart."
+        @if let Some(reason) = without_collisions(frontier) { p { strong { (reason) } } } @else {
+            p.note {
+                "Marked combinations are Pareto-optimal: no other one prevents more, induces less or loses less speed without being worse "
+                "in another of the three. All combinations run the same samples. Lines are 95 % intervals. Overlapping "
+                "intervals do not tell two combinations apart."
+            }
         }
         @for (_, svg) in charts { figure.broad tabindex="0" { (PreEscaped(svg)) } }
         section {

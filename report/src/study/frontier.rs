@@ -80,6 +80,9 @@ impl Display for FrontierText<'_> {
         if let Some(others) = others(frontier) {
             writeln!(f, "\n{others}")?;
         }
+        if let Some(reason) = without_collisions(frontier) {
+            return writeln!(f, "\n{reason}");
+        }
         writeln!(
             f,
             "\n{OPTIMAL}: Pareto-optimal. No other combination prevents more, induces less or loses less speed without being \
@@ -91,7 +94,19 @@ impl Display for FrontierText<'_> {
 /// A value of a point with its interval.
 type Placed = (f64, [f64; 2]);
 
-/// Returns the charts of a frontier with their names.
+/// Returns why a frontier has no chart and no mark, in a sentence. `None` if a sample collides without the system.
+pub(super) fn without_collisions(frontier: &Frontier) -> Option<String> {
+    let baseline = frontier.controllers.first().map_or("", String::as_str);
+    let is_without = |point: &Point| point.collisions_without == 0 && point.prevented.is_none();
+    frontier.points.iter().all(is_without).then(|| {
+        format!(
+            "With {baseline} no sample collides, so that there is nothing to prevent: no combination is marked, and there is no \
+             chart. More samples may show more."
+        )
+    })
+}
+
+/// Returns the charts of a frontier with their names. A chart without a point is left out.
 pub(super) fn charts(frontier: &Frontier) -> io::Result<Vec<(&'static str, String)>> {
     let percent = |estimate: Option<Estimate>| {
         estimate.map(|Estimate { value, interval_95 }| (100.0 * value, interval_95.map(|bound| 100.0 * bound)))
@@ -110,10 +125,9 @@ pub(super) fn charts(frontier: &Frontier) -> io::Result<Vec<(&'static str, Strin
     let induced = points(&|point| Some([percent(point.induced)?, percent(point.prevented)?]));
     let lost = points(&|point| Some([plain(point.speed_lost_mps)?, percent(point.prevented)?]));
     let prevented = "prevented, of the collisions without the system [%]";
-    Ok(vec![
-        ("induced", scatter(&induced, &title, ["induced, of all samples [%]", prevented])?),
-        ("speed", scatter(&lost, &title, ["mean speed lost [m/s]", prevented])?),
-    ])
+    let charts = [("induced", induced, "induced, of all samples [%]"), ("speed", lost, "mean speed lost [m/s]")];
+    let drawn = charts.into_iter().filter(|(_, points, _)| !points.is_empty());
+    drawn.map(|(name, points, across)| Ok((name, scatter(&points, &title, [across, prevented])?))).collect()
 }
 
 #[cfg(test)]
@@ -146,6 +160,16 @@ mod tests {
             points: vec![point("1", 0), point("2", both_of_others)],
             errors: RunErrors::default(),
         }
+    }
+
+    #[test]
+    fn a_frontier_without_a_collision_to_prevent_has_no_chart_and_says_why() {
+        let mut nothing = frontier(0);
+        nothing.points.iter_mut().for_each(|point| point.collisions_without = 0);
+        assert!(charts(&nothing).unwrap().is_empty());
+        let text = FrontierText(&nothing).to_string();
+        assert!(text.contains("With acc no sample collides") && !text.contains(OPTIMAL), "{text}");
+        assert!(!FrontierText(&frontier(0)).to_string().contains("no sample collides"));
     }
 
     #[test]

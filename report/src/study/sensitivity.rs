@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use closecall_campaign::sensitivity::{
     Decomposition, FactorKind, OutputEffects, OutputIndices, Screening, Sensitivity,
 };
+use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 use closecall_traffic::statistics::sensitivity::morris::Effects;
 use closecall_traffic::statistics::sensitivity::saltelli::MainEffect;
 
@@ -67,8 +68,13 @@ fn by_main_effect(study: &Sensitivity, output: &OutputIndices, greatest: usize) 
         }
         _ => String::new(),
     };
-    let index = with_interval(effect(greatest));
+    let index = with_interval(effect(greatest).map(share_of_variance));
     format!("{} from its lowest to its highest quarter, index {index}{doubt}", from_to(output, greatest))
+}
+
+/// Returns an index without the part of its interval that no share of a variance can have.
+fn share_of_variance(index: Estimate) -> Estimate {
+    index.within([0.0, 1.0])
 }
 
 /// Returns the means of an output in the lowest and in the highest quarter of a factor.
@@ -122,7 +128,7 @@ fn write_decomposition(f: &mut Formatter<'_>, study: &Sensitivity, decomposition
         let heads = ["what moves the mean", "lowest → highest quarter", "index of the quarters (95 %)"];
         let mut rows = vec![heads.map(str::to_owned).to_vec()];
         rows.extend(output.strongest().into_iter().take(LISTED).map(|factor| {
-            let index = output.main_effects[factor].map(|effect| effect.index);
+            let index = output.main_effects[factor].map(|effect| share_of_variance(effect.index));
             vec![study.factors[factor].label(), from_to(output, factor), with_interval(index)]
         }));
         write_rows(f, &rows)?;

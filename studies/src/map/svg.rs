@@ -23,7 +23,7 @@ pub fn panel(map: &Map, front_thw_s: f64) -> String {
     let (width, height) = (LEFT + columns * cell_px + RIGHT, TOP + rows * CELL[1] + BOTTOM);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-         font-family=\"sans-serif\" font-size=\"12\" role=\"img\"><title>Margin at a front time headway of {front_thw_s} s</title>\
+         font-family=\"DejaVu Sans, sans-serif\" font-size=\"12\" role=\"img\"><title>Margin at a front time headway of {front_thw_s} s</title>\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>"
     );
     text(&mut svg, [LEFT, 18.0], "start", &title);
