@@ -18,7 +18,7 @@ pub fn document(title: &str, body: &Markup) -> Markup {
                 title { (title) }
                 style { (PreEscaped(STYLE)) }
             }
-            body { main { (body) } }
+            body { main { (PreEscaped(with_whole_percentages(&body.0))) } }
         }
     }
 }
@@ -93,9 +93,43 @@ pub(crate) fn breakable(expression: &str) -> Markup {
     html! { @for piece in expression.split_inclusive(ends_word) { (piece) wbr; } }
 }
 
-/// Returns a text in which no line ends between a number and its percent sign.
-pub(super) fn unbroken(text: &str) -> String {
-    text.replace(" %", "\u{a0}%")
+/// Elements whose text is run or copied, and stays as it is.
+const VERBATIM: [&str; 4] = ["script", "style", "code", "pre"];
+
+/// Returns markup in which no line ends between a number and its percent sign.
+fn with_whole_percentages(markup: &str) -> String {
+    let mut whole = String::with_capacity(markup.len());
+    let mut verbatim: Option<&str> = None;
+    for part in markup.split_inclusive('>') {
+        let (text, tag) = part.split_at(part.rfind('<').unwrap_or(part.len()));
+        match verbatim {
+            Some(name) => {
+                whole.push_str(text);
+                verbatim = verbatim.filter(|_| !is_tag(tag, &format!("</{name}")));
+            }
+            None => {
+                push_whole_percentages(&mut whole, text);
+                verbatim = VERBATIM.into_iter().find(|name| is_tag(tag, &format!("<{name}")));
+            }
+        }
+        whole.push_str(tag);
+    }
+    whole
+}
+
+/// Returns whether a tag begins like this, and its name ends there.
+fn is_tag(tag: &str, begin: &str) -> bool {
+    tag.strip_prefix(begin).is_some_and(|rest| rest.starts_with([' ', '>']))
+}
+
+/// Appends a text, with a space that does not break a line before each percent sign after a digit.
+fn push_whole_percentages(whole: &mut String, text: &str) {
+    for (index, piece) in text.split(" %").enumerate() {
+        if index > 0 {
+            whole.push_str(if whole.ends_with(|last: char| last.is_ascii_digit()) { "\u{a0}%" } else { " %" });
+        }
+        whole.push_str(piece);
+    }
 }
 
 /// Returns the heads of columns of text.
@@ -149,7 +183,12 @@ mod tests {
 
     #[test]
     fn no_line_ends_between_a_number_and_its_percent_sign() {
-        assert_eq!(unbroken("6 of 30 (20 %); at most 3 %"), "6 of 30 (20\u{a0}%); at most 3\u{a0}%");
+        let markup =
+            "<p title=\"1 %\">6 of 30 (<b>20 %</b>), in %</p><pre>7 % 2</pre><p>3 %</p><script>4 %'<p>'5 %</script>6 %";
+        let expected = "<p title=\"1 %\">6 of 30 (<b>20\u{a0}%</b>), in %</p><pre>7 % 2</pre><p>3\u{a0}%</p><script>4 %'<p>'5 %</script>6\u{a0}%";
+        assert_eq!(with_whole_percentages(markup), expected);
+        let page = document("t", &html! { p { "at most 3 %" } }).into_string();
+        assert!(page.contains("at most 3\u{a0}%"), "{page}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::page::{breakable, table, text_heads, unbroken};
+use super::page::{breakable, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::words::{gate_words, is_said, sentence, worst_first};
 use closecall_campaign::gate::{GateResult, Standing};
@@ -50,7 +50,7 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
             div {
                 h1 { (sentence) }
                 @if !missed.is_empty() {
-                    ul { @for gate in missed { li.failure { "NOT MET: " (gate.scenario) ": " (unbroken(&gate_words(gate))) } } }
+                    ul { @for gate in missed { li.failure { "NOT MET: " (gate.scenario) ": " (gate_words(gate)) } } }
                 }
                 p.headline { (headline(findings)) }
                 p.what {
@@ -149,7 +149,7 @@ fn gate_table(gates: &[&GateResult]) -> Markup {
                 td { (badge(gate.standing())) }
                 td { (gate.scenario) }
                 td { (gate.source.to_string()) }
-                td { (unbroken(&gate_words(gate))) }
+                td { (gate_words(gate)) }
                 td { code { (breakable(&gate.expression.to_string())) } }
             }
         }
