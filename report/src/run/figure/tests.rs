@@ -158,7 +158,7 @@ fn a_vehicle_in_the_left_lane_has_its_label_beside_it_if_there_is_room_nowhere_e
     (states[lead].s_m, states[rear].s_m, states[rear].d_m) = (ego.s_m + 20.0, ego.s_m + 24.0, left_m);
     let mut svg = svg::Svg::new([360.0, 120.0]);
     let area = svg::Area { left: 8.0, top: 8.0, width: 344.0, height: 100.0 };
-    strip::draw(&mut svg, (film, None), 0, (area, [-38.0, 70.0]));
+    strip::draw(&mut svg, (&*film, None), 0, (area, [-38.0, 70.0]));
     let text = svg.finish();
     assert!(text.contains(">F front ") && text.contains(">R rear "), "{text}");
 }

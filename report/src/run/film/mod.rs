@@ -35,4 +35,4 @@ pub use recorder::FilmRecorder;
 pub(super) use scan::{NO_CLUSTER, Scan};
 pub(super) use story::{driver_note_text, ego_state_name};
 pub use traffic::{TrafficFilmError, film_lane_change};
-pub(super) use verdict::{fate_word, headway_text, headways};
+pub(super) use verdict::{fate_word, headway_text};

@@ -110,7 +110,7 @@ impl Film {
 }
 
 /// Returns the smallest headways of a run.
-pub(in crate::run) fn headways(outcome: &Outcome) -> String {
+fn headways(outcome: &Outcome) -> String {
     let margins = &outcome.margins;
     let headways = [("front", margins.min_thw_front_s), ("rear", margins.min_thw_rear_s)];
     let texts = headways.iter().filter_map(|(name, thw_s)| Some(format!("{name} {}", headway_text(thw_s.ok()?))));

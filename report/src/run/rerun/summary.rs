@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use closecall_traffic::{Measured, Time};
 
-use crate::run::film::{Film, fate_word, headway_text, headways};
+use crate::run::film::{Film, fate_word, headway_text};
 use closecall_campaign::ledger::PairFate;
 use closecall_scenarios::causal::{CausalSentence, LETTERS};
 
