@@ -241,13 +241,25 @@ fn is_traffic(films: &[FilmContents]) -> bool {
 /// Room for the half of a label at the end of a time axis, as a share of its length: 15 px of 500 px.
 const LABEL_ROOM: f64 = 0.03;
 
+/// Lengths of a run between which the viewer labels no tick but the first, in a window of 1280 px: single seconds have no
+/// room, and the next labelled tick is beyond the end (s). The axis of such a run reaches to that tick.
+const BETWEEN_TICKS_S: [f64; 2] = [6.5, 10.0];
+
 /// Returns a time axis over the longest of the films, with room for the label of its last tick.
 fn whole_run(films: &[FilmContents]) -> TimeAxis {
     let start = films.iter().map(|film| film.span[0]).min().unwrap_or(Time::ZERO);
     let end = films.iter().map(|film| film.span[1]).max().unwrap_or(Time::ZERO);
-    let room = Time::from_s(LABEL_ROOM * (end - start).s());
     let boundary = |time: Time| TimeRangeBoundary::Absolute(TimeInt(time.ns()));
-    TimeAxis::new().with_view_range(TimeRange { start: boundary(start), end: boundary(end + room) })
+    let shown = Time::from_s(axis_length_s(start, end));
+    TimeAxis::new().with_view_range(TimeRange { start: boundary(start), end: boundary(start + shown) })
+}
+
+/// Returns the length of the time axis of a run (s).
+fn axis_length_s(start: Time, end: Time) -> f64 {
+    let [from_s, to_s] = BETWEEN_TICKS_S;
+    let length_s = (end - start).s();
+    let is_without_second = start == Time::ZERO && length_s > from_s && length_s < to_s;
+    (1.0 + LABEL_ROOM) * if is_without_second { to_s } else { length_s }
 }
 
 /// Returns the log. It shows the texts only: their colours and words make other columns redundant.
@@ -273,6 +285,15 @@ fn titled(title: &str, films: &[FilmContents], film: &FilmContents) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_time_axis_has_room_for_its_last_label_and_for_a_second_one() {
+        let length_s = |end_ms| axis_length_s(Time::ZERO, Time::from_ms(end_ms));
+        assert!((length_s(60_000) - 61.8).abs() < 1e-9 && (length_s(6_000) - 6.18).abs() < 1e-9);
+        assert!((length_s(8_900) - 10.3).abs() < 1e-9, "the tick of 10 s is on the axis");
+        let recorded = axis_length_s(Time::from_ms(133_600), Time::from_ms(142_000));
+        assert!((recorded - 1.03 * 8.4).abs() < 1e-9, "a multiple of 10 s may lie within");
+    }
 
     #[test]
     fn the_verdict_has_the_room_of_its_lines_and_not_more() {

@@ -36,7 +36,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
     lines.extend(reasons(film));
     lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
     lines.push(plain("log/critical", film.critical_frame_time(), "the critical moment".to_owned()));
-    lines.push(plain("log/run", film.end(), "the run ends here".to_owned()));
+    let end = if film.outcome().is_some() { "the run ends here" } else { "the recorded stretch ends here" };
+    lines.push(plain("log/run", film.end(), end.to_owned()));
     // The lines of an entity make up one chunk.
     let mut of_entity: BTreeMap<&str, Vec<Line>> = BTreeMap::new();
     for line in lines {
