@@ -15,7 +15,10 @@ use super::paper_charts::{METRICS, histogram, share_chart};
 use super::robustness::{RobustnessText, robustness_charts};
 use super::statistics::{BOXED, Boxed, RecordedChanges, StatisticsText, box_chart, by_class, summary};
 use super::trajectory_charts::{BoxSummary, ChartError};
-use crate::campaign::html::page::{document, table};
+use crate::campaign::html::page::{document, head, table};
+
+/// The title of the page.
+const TITLE: &str = "Recorded lane changes";
 
 /// A picture of the page.
 #[derive(Clone, Debug)]
@@ -100,12 +103,11 @@ fn page(
     let figure = |number: u32| pictures.iter().filter(move |picture| picture.figure == number);
     let drawn = |number: u32| {
         html! {
-            div.drawings { @for picture in figure(number) { figure { (PreEscaped(&picture.svg)) } } }
+            div.drawings { @for picture in figure(number) { figure.broad tabindex="0" { (PreEscaped(&picture.svg)) } } }
         }
     };
     let body = html! {
-        h1 { "Recorded lane changes" }
-        p { "Trajectory files: " (names.join(", ")) }
+        (head(TITLE, &[], &format!("Trajectory files: {}", names.join(", "))))
         @if let Some((each, together)) = robustness {
             h2 { "Figure 3: what the criteria tolerate" }
             (drawn(3))
@@ -124,5 +126,5 @@ fn page(
         h2 { "Figure 7: critical shares to the left and to the right" }
         (drawn(7))
     };
-    document("Recorded lane changes", &body).into_string()
+    document(TITLE, &body).into_string()
 }
