@@ -405,8 +405,9 @@ mod tests {
         mis.engaged_at_s = Ok(6.2);
         mis.decided_s = Some([2.7, 9.0]);
         mis.reasons = vec![ReasonSpan { reason: Reason::NoRear, from_s: 2.0, until_s: 6.2 }];
-        let expected = format!("before F braked; not sooner: {}, 2.7 to 6.2 s; faults: none", Reason::NoRear);
-        assert!(sentence(&run, &[]).ends_with(&expected), "{}", sentence(&run, &[]));
+        let told = sentence(&run, &[]);
+        let expected = "before F braked; not sooner: vehicle behind not seen in the lane, 2.7 to 6.2 s; faults: none";
+        assert!(told.ends_with(expected), "{told}");
     }
 
     #[test]

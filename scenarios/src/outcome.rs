@@ -283,6 +283,9 @@ pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Opti
 /// reader asks for the reason of a delay that a driver would notice: 0.5 to 2 s are plausible.
 const LATE_S: f64 = 1.0;
 
+/// The reason of a system that sees no vehicle behind where there is one.
+const NOT_SEEN: &str = "vehicle behind not seen in the lane";
+
 /// The actions of the margin increase system (MIS) in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
@@ -337,8 +340,8 @@ impl MisSummary {
         }
     }
 
-    /// Returns why the system did not engage sooner, and over which time that held: *no vehicle behind in the lane, 2.7
-    /// to 6.2 s*. `None` if it engaged within [`LATE_S`] after the vehicle behind met the conditions on distance and
+    /// Returns why the system did not engage sooner, and over which time that held: *vehicle behind not seen in the lane,
+    /// 2.7 to 6.2 s*. `None` if it engaged within [`LATE_S`] after the vehicle behind met the conditions on distance and
     /// speed, or never.
     pub fn delay_words(&self) -> Option<String> {
         let (engaged_at_s, [from_s, until_s]) = (self.engaged_at_s.ok()?, self.decided_s?);
@@ -348,7 +351,9 @@ impl MisSummary {
         }
         let reason = longest_reason(&self.reasons, waited_s)?;
         let [from_s, until_s] = self.held_s(reason, waited_s).filter(|_| reason != Reason::External)?;
-        Some(format!("{reason}, {from_s:.1} to {until_s:.1} s"))
+        // A vehicle behind is near and in the lane all this time.
+        let words = if reason == Reason::NoRear { NOT_SEEN.to_owned() } else { reason.to_string() };
+        Some(format!("{words}, {from_s:.1} to {until_s:.1} s"))
     }
 }
 
@@ -594,12 +599,8 @@ mod tests {
             decided_s: Some([2.7, 9.0]),
             unavailable: None,
         };
-        let expected = format!("{}, 3.0 to 6.2 s", Reason::NoRear);
-        assert_eq!(
-            mis.delay_words().as_deref(),
-            Some(expected.as_str()),
-            "neither what held before nor the engagement"
-        );
+        let expected = "vehicle behind not seen in the lane, 3.0 to 6.2 s";
+        assert_eq!(mis.delay_words().as_deref(), Some(expected), "neither what held before nor the engagement");
         mis.decided_s = Some([5.9, 9.0]);
         assert_eq!(mis.delay_words(), None, "not late");
         mis.decided_s = Some([7.0, 9.0]);
