@@ -341,7 +341,7 @@ impl MisSummary {
     }
 
     /// Returns why the system did not engage sooner, and over which time that held: *vehicle behind not seen in the lane,
-    /// 2.7 to 6.2 s*. `None` if it engaged within [`LATE_S`] after the vehicle behind met the conditions on distance and
+    /// 2.7 to 6.2 s*. `None` if it engaged within one second after the vehicle behind met the conditions on distance and
     /// speed, or never.
     pub fn delay_words(&self) -> Option<String> {
         let (engaged_at_s, [from_s, until_s]) = (self.engaged_at_s.ok()?, self.decided_s?);
