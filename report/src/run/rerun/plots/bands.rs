@@ -39,30 +39,35 @@ const PADDING_LETTERS: f64 = 1.5;
 #[derive(Clone, Copy)]
 struct Word<'a> {
     text: &'a str,
-    /// The texts of a bar that is too short for the whole text, and of one that is too short for the
-    /// first of them.
-    shorts: [&'a str; 2],
+    /// The texts of a bar that is too short for the whole text, each for a bar too short for the one before.
+    shorts: [&'a str; 3],
     colour: Rgba,
 }
 
 impl<'a> Word<'a> {
     const fn new(text: &'a str, short: &'a str, colour: Rgba) -> Self {
-        Self { text, shorts: [short, short], colour }
+        Self { text, shorts: [short; 3], colour }
+    }
+
+    /// Returns the state with a text for a bar that has no room for the whole text, and room for more than the short one.
+    const fn with_longer(self, longer: &'a str) -> Self {
+        Self { shorts: [longer, self.shorts[1], self.shorts[2]], ..self }
     }
 
     /// Returns the state with a text for a bar that is too short for its other texts.
     const fn with_shortest(self, shortest: &'a str) -> Self {
-        Self { shorts: [self.shorts[0], shortest], ..self }
+        Self { shorts: [self.shorts[0], self.shorts[1], shortest], ..self }
     }
 
     /// Returns the state and the label of a bar with room for this many letters. A bar too short
     /// for the text has a separate state, since the viewer has one label per state.
     fn fitted(&self, letters: f64) -> (String, &'a str) {
         let fits = |label: &str| label.chars().count() as f64 <= letters;
-        let [short, shortest] = self.shorts;
-        match [self.text, short, shortest].into_iter().position(fits) {
+        let [longer, short, shortest] = self.shorts;
+        match [self.text, longer, short, shortest].into_iter().position(fits) {
             Some(0) => (self.text.to_owned(), self.text),
-            Some(1) => (format!("{} (briefly)", self.text), short),
+            Some(1) => (format!("{} (briefly)", self.text), longer),
+            Some(2) => (format!("{} (quite briefly)", self.text), short),
             Some(_) => (format!("{} (very briefly)", self.text), shortest),
             None => (format!("{} (for a moment)", self.text), NO_LABEL),
         }
@@ -337,9 +342,12 @@ impl Plots<'_> {
             if !has_fault && self.film.frames.iter().all(|frame| health(frame).is_none()) {
                 continue;
             }
+            let held = |time: Time| -> Vec<&StatedFault> {
+                let concerns = |fault: &&StatedFault| groups.contains(&fault.group) && fault.holds_at(time);
+                self.film.faults.iter().filter(concerns).collect()
+            };
             let text = |frame: &Frame| {
-                let concerns = |fault: &StatedFault| groups.contains(&fault.group) && fault.holds_at(frame.time);
-                let held = self.film.faults.iter().filter(|fault| concerns(fault));
+                let held = held(frame.time).into_iter();
                 let effects: Vec<String> = held.map(|fault| format!("{} {}", fault.sensor, fault.effects)).collect();
                 let suffix = if effects.is_empty() { String::new() } else { format!(": {}", effects.join("; ")) };
                 let alarms = alarms(frame);
@@ -358,10 +366,22 @@ impl Plots<'_> {
                 word if word.starts_with(FAILED) => palette::CRITICAL,
                 _ => palette::WARNING,
             };
-            let states: Vec<Word<'_>> = changes(&words)
-                .into_iter()
-                .map(|row| {
+            let rows = changes(&words);
+            // A group has several sensors, so that a bar names the faulty one first.
+            let named = |row: &usize| {
+                let held = held(self.film.frames[*row].time);
+                let mut sensors: Vec<&str> = held.into_iter().map(|fault| fault.sensor.as_str()).collect();
+                sensors.dedup();
+                let state = first_word(words[*row]);
+                if sensors.is_empty() { state.to_owned() } else { format!("{state}: {}", sensors.join(", ")) }
+            };
+            let named: Vec<String> = rows.iter().map(named).collect();
+            let states: Vec<Word<'_>> = rows
+                .iter()
+                .zip(&named)
+                .map(|(&row, named)| {
                     Word::new(words[row], first_word(words[row]), colour(words[row]))
+                        .with_longer(named)
                         .with_shortest(shortest_health(words[row]))
                 })
                 .collect();
@@ -455,6 +475,10 @@ mod tests {
         let state = Word::new("degraded, as too few returns", "degraded", palette::WARNING).with_shortest("deg");
         assert_eq!(state.fitted(4.0), ("degraded, as too few returns (very briefly)".to_owned(), "deg"));
         assert_eq!(state.fitted(8.0).1, "degraded");
+        let state = state.with_longer("degraded: rear camera");
+        assert_eq!(state.fitted(21.0).1, "degraded: rear camera");
+        assert_eq!(state.fitted(20.0), ("degraded, as too few returns (quite briefly)".to_owned(), "degraded"));
+        assert_eq!(state.fitted(4.0).1, "deg");
     }
 
     #[test]
