@@ -10,7 +10,7 @@ use closecall_recorded::aerial::{Boxes, Correction, Flight, FlightOptions, Foota
 use closecall_recorded::trajectory_data::write_trajectories;
 use closecall_report::json::stamped;
 use closecall_sensors::inference_backend;
-use closecall_traffic::atomic::WriteError;
+use closecall_traffic::atomic::create_folder;
 use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
@@ -20,7 +20,7 @@ use super::backend::check_backend;
 use super::help::{examples, heading};
 use super::output::{outln, print_text, print_written};
 use super::progress::watched;
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
 /// The names of the files that a flight writes: the truth, the tracks as they are seen and with the
@@ -153,6 +153,7 @@ pub(super) fn aerial(args: &AerialArgs) -> Result<ExitCode, CliError> {
     for path in folders.iter().flat_map(|folder| FLIGHT_FILES.map(|name| folder.join(name))) {
         protect(&inputs, &[("--out", Some(&path))])?;
     }
+    folders.iter().try_for_each(|folder| must_be_folder(Some(folder)))?;
     check_backend(args.boxes == BoxesChoice::Detected)?;
     let data_sets = args.data.read_all()?;
     let (mut flights, mut summaries) = (Vec::new(), Vec::new());
@@ -194,7 +195,7 @@ fn summary(flight: &Flight, file: &Path, folder: &Path, seed: u64) -> Value {
 
 /// Writes what a flight has seen into a folder, which is created if it does not exist.
 fn save(flight: &Flight, folder: &Path) -> Result<(), CliError> {
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+    create_folder(folder)?;
     let [truth, raw, corrected, picture] = FLIGHT_FILES.map(|name| folder.join(name));
     for (data, path) in [(&flight.truth, &truth), (&flight.raw, &raw), (&flight.corrected, &corrected)] {
         write_trajectories(data, path)?;

@@ -13,7 +13,7 @@ use super::args::{Format, ReadFiles};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, print_written};
 use super::progress::watched;
-use super::protect::protect;
+use super::protect::{must_be_writable, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic calibrate`.
@@ -48,6 +48,7 @@ enum Model {
 
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
     protect(&args.files, &[("--out", args.output.as_deref())])?;
+    must_be_writable(args.output.as_deref())?;
     let data = read(&args.files)?;
     let mut files = ReadFiles::default();
     data.files.iter().try_for_each(|file| files.note(&file.path, &file.blake3))?;

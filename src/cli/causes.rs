@@ -30,7 +30,7 @@ use super::advice::to_provide;
 use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::output::{during, outln, print_error, print_text, print_written, textln};
-use super::protect::{of_campaign, protect};
+use super::protect::{must_be_folder, must_be_writable, of_campaign, protect};
 use super::saved::SavedArgs;
 use crate::exit_code::ExitCode;
 
@@ -150,6 +150,7 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     let of_nearest = search.as_ref().map(|_| PathBuf::from(format!("{}-nearest.toml", case.file.config().name)));
     let paths = output_files(&case, args.output.as_deref().or(of_nearest.as_deref()))?;
     protect(&of_campaign(&args.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
+    paths.iter().try_for_each(|path| must_be_writable(Some(path)))?;
     let minimized = during(format!("minimizing a failure of {}", args.dir.display()), || match search {
         Some(search) => search.run(&saved, args.runs.unwrap_or(NEAREST_RUNS)),
         None => minimize_sample(&saved, &case),
@@ -203,6 +204,7 @@ pub(super) struct MapArgs {
 }
 
 pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
+    must_be_folder(args.out.as_deref())?;
     let MapArgs { speed_mps, closing_kmh, detection_m, front_thw_s, .. } = args;
     let (closing_kmh, detection_m, front_thw_s) = (closing_kmh.clone(), detection_m.clone(), front_thw_s.clone());
     let grid = MapGrid { speed_mps: *speed_mps, closing_kmh, detection_m, front_thw_s };

@@ -51,7 +51,7 @@ use super::ending::EndArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{made_by, print_error};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, of_trajectories, protect};
 use super::results::{ArtifactArgs, ResultsArgs};
 use crate::exit_code::ExitCode;
 
@@ -135,6 +135,7 @@ struct Chain {
 pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
     let inputs = of_trajectories(&args.data.files);
     protect(&inputs, &[("--out", Some(&args.out))])?;
+    must_be_folder(Some(&args.out))?;
     let controllers = match args.controller.choice(Function::Mis)? {
         ControllerChoice::ACC => {
             return Err(CliError::usage(

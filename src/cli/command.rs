@@ -286,7 +286,13 @@ fn allowed_number(error: &(dyn Error + 'static)) -> Option<String> {
             _ => "a whole number, 0 or more".to_owned(),
         });
     }
-    error.is::<ParseFloatError>().then(|| "a number, such as 0.5".to_owned())
+    if error.is::<ParseFloatError>() {
+        return Some("a number, such as 0.5".to_owned());
+    }
+    // The parser of clap states its range as Rust writes it: `0 is not in 1..=10`.
+    let message = error.to_string();
+    let (least, largest) = message.split_once(" is not in ")?.1.split_once("..=")?;
+    Some(format!("a whole number from {least} to {largest}"))
 }
 
 /// Runs the program with these arguments. The first is the program's name.
@@ -320,7 +326,13 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
                 print_error(format_args!("{}", error.render()));
                 return code;
             }
-            return if error.print().is_ok() { code } else { ExitCode::Io };
+            return match error.print() {
+                // As in all messages, a reader that has gone does not change the exit code.
+                Err(failure) if code == ExitCode::Pass && failure.kind() != std::io::ErrorKind::BrokenPipe => {
+                    ExitCode::Io
+                }
+                _ => code,
+            };
         }
     };
     // The browser that `view` opens outlives it.

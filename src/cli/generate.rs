@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Command};
 use clap_complete::Shell;
-use closecall_traffic::atomic::WriteError;
+use closecall_traffic::atomic::{WriteError, create_folder};
 
 use super::CliError;
 use super::help::{examples, heading};
@@ -57,9 +57,8 @@ pub(super) fn man(args: &ManArgs, command: Command) -> Result<ExitCode, CliError
             out!("{}", String::from_utf8_lossy(&page));
         }
         Some(folder) => {
-            let fail = |source| WriteError::new(folder, source);
-            std::fs::create_dir_all(folder).map_err(fail)?;
-            clap_mangen::generate_to(command, folder).map_err(fail)?;
+            create_folder(folder)?;
+            clap_mangen::generate_to(command, folder).map_err(|source| WriteError::new(folder, source))?;
             print_written(folder);
         }
     }

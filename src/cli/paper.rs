@@ -16,7 +16,7 @@ use super::CliError;
 use super::args::FilesArgs;
 use super::help::{examples, heading};
 use super::output::{during, print_written, write_charts};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, of_trajectories, protect};
 use super::robustness::refused;
 use crate::exit_code::ExitCode;
 
@@ -47,6 +47,7 @@ pub(super) struct PaperArgs {
 pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let index = args.output.join("index.html");
     protect(&of_trajectories(&args.data.files), &[("--out", Some(&index))])?;
+    must_be_folder(Some(&args.output))?;
     let data_sets = args.data.read_all()?;
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ..Judgement::default() };
     let recorded = data_sets

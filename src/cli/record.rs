@@ -18,7 +18,7 @@ use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
 use super::progress::watched;
-use super::protect::{of_scenario, protect};
+use super::protect::{must_be_writable, of_scenario, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic record`.
@@ -66,6 +66,7 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let file = args.sim.set.load(&args.scenario)?;
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &[("--out", Some(&args.output))])?;
     check_ending(&args.output)?;
+    must_be_writable(Some(&args.output))?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let EndedAtCollisions { data: recording, collided } = recorder.finish_at_collisions(&file.config().name);
@@ -86,6 +87,7 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let outputs = [("--out", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
     check_ending(&args.output)?;
+    must_be_writable(Some(&args.output))?;
     let chosen = recorded_actor(file.config(), actor)
         .map_err(|message| CliError::Usage { message: format!("{message}, with --in-car=ACTOR") })?;
     let mut recorder = InCarRecorder::new(&chosen);

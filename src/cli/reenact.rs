@@ -20,7 +20,7 @@ use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
 use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
 use super::output::{made_by, outln, print_text, print_written};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_writable, of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
 
@@ -83,6 +83,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
+    must_be_writable(args.output.as_deref())?;
     let wanted = Wanted { track: args.track, number: None, lead: Lead::Required };
     let encounter = chosen(&args.file, &args.read, wanted)?;
     let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);

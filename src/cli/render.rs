@@ -8,12 +8,14 @@ use closecall_campaign::arguments::scene_count;
 use closecall_recorded::aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_report::json::stamped;
 use closecall_sensors::datasets::{CameraLooks, Content, DatasetOptions, MAX_VEHICLES, Set, render_dataset};
+use closecall_traffic::words::counted;
 use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
 use super::help::{examples, heading};
 use super::output::{during, outln, print_written};
+use super::protect::must_be_new;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall tool render`.
@@ -24,7 +26,7 @@ use crate::exit_code::ExitCode;
     "closecall tool render --aerial -n 100 --seed 1 -o aerial",
 ]))]
 pub(super) struct RenderArgs {
-    /// Folder for the images
+    /// Folder for the images. It must be new or empty
     #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Number of random scenes
@@ -64,6 +66,7 @@ fn vehicles(text: &str) -> Result<[usize; 2], String> {
 }
 
 pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
+    must_be_new(&args.output)?;
     let set = if args.set == "training" { Set::Training } else { Set::HeldOut };
     let (scenes, seed) = (args.scenes, args.seed);
     if args.aerial {
@@ -83,8 +86,10 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),
         Format::Human => {
             let [car, truck, motorcycle, background] = summary.labels;
-            outln!("{} images of {} scenes", summary.pictures, summary.scenes);
-            outln!("labels: {car} cars, {truck} trucks, {motorcycle} motorcycles, {background} background");
+            let pictures = if args.crops { "crop" } else { "image" };
+            outln!("{} of {}", counted(summary.pictures, pictures), counted(summary.scenes, "scene"));
+            let (cars, trucks) = (counted(car, "car"), counted(truck, "truck"));
+            outln!("labels: {cars}, {trucks}, {}, {background} background", counted(motorcycle, "motorcycle"));
         }
     }
     print_written(&args.output);

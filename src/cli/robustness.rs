@@ -14,7 +14,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
 use super::output::{during, outln, print_error, print_text, write_charts};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic robustness`.
@@ -46,6 +46,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     for chart in charts.iter().flatten() {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
+    must_be_folder(args.plot.as_deref())?;
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = during("studying the robustness".to_owned(), || {
         study(&args.data.files, args.data.read.options(), &setup, |path, warning| {

@@ -16,7 +16,7 @@ use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
 use super::help::{examples, heading};
 use super::output::{during, made_by, outln, print_text, print_written, write_charts};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, of_trajectories, protect};
 use super::reenact::chosen_by;
 use crate::exit_code::ExitCode;
 
@@ -81,6 +81,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
     let files = of_trajectories(std::slice::from_ref(&args.file));
     protect(&files, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
+    must_be_folder(args.output.as_deref())?;
     // The margin increase system needs a lead vehicle; a driver that is sampled does not.
     let lead = if args.transfer { Lead::Required } else { Lead::LeftOut };
     let wanted = Wanted { track: args.lane_change, number: args.number, lead };

@@ -13,6 +13,7 @@ use super::backend::{check_backend, check_camera};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, print_written};
 use super::progress::watched;
+use super::protect::must_be_folder;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall study sensors`.
@@ -53,6 +54,7 @@ pub(super) struct SensorsArgs {
 }
 
 pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
+    must_be_folder(args.out.as_deref())?;
     let choice = args.sensors.unwrap_or(SensorsChoice::Full);
     check_backend(choice == SensorsChoice::Full)?;
     let extent = args.approaches.map_or(if args.quick { Extent::Quick } else { Extent::Full }, Extent::Runs);

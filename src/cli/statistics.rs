@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, write_charts};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic statistics`.
@@ -44,6 +44,7 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     for chart in charts.iter().flatten() {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
+    must_be_folder(args.plot.as_deref())?;
     let data_sets = args.data.read_all()?;
     let is_in_doubt = data_sets.iter().any(|data| data.is_in_doubt);
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ..Judgement::default() };

@@ -30,6 +30,7 @@ use super::backend::{check_backend, check_cameras};
 use super::campaign::progress_bar;
 use super::help::{examples, heading};
 use super::output::{heartbeat, outln, print_text, print_written};
+use super::protect::must_be_folder;
 use crate::exit_code::ExitCode;
 
 /// Arguments that the studies of a scenario share.
@@ -235,6 +236,7 @@ fn print(study: Option<Study>, format: Format, folder: Option<&Path>) -> Result<
 
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
     let (study, number) = (&args.study, |count: u64| usize::try_from(count).unwrap_or(usize::MAX));
+    must_be_folder(study.out.as_deref())?;
     let (file, sensors, named) = (study.file()?, study.sensors.map(SensorsChoice::mode), args.factors.clone());
     refuse_set(&file, "--factor", named.iter().map(|range| range.key.as_str()))?;
     let mut plan = SensitivityPlan::new(&file, &study.controllers(&file)?, sensors, named, !args.no_default_factors)?;
@@ -247,6 +249,7 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> 
 
 pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let study = &args.study;
+    must_be_folder(study.out.as_deref())?;
     let file = study.file()?;
     for (index, Grid { key, .. }) in args.vary.iter().enumerate() {
         if args.vary[..index].iter().any(|earlier| earlier.key == *key) {
@@ -271,6 +274,7 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
 
 pub(super) fn boundary(args: &BoundaryArgs) -> Result<ExitCode, CliError> {
     let study = &args.study;
+    must_be_folder(study.out.as_deref())?;
     let (file, sensors) = (study.file()?, study.sensors.map(SensorsChoice::mode));
     refuse_set(&file, "--along", args.along.iter().map(|axis| axis.key.as_str()))?;
     let mut plan = BoundaryPlan::new(&file, &args.along, args.event, &study.controllers(&file)?, sensors)?;
@@ -281,6 +285,7 @@ pub(super) fn boundary(args: &BoundaryArgs) -> Result<ExitCode, CliError> {
 }
 
 pub(super) fn anchor(args: &AnchorArgs) -> Result<ExitCode, CliError> {
+    must_be_folder(args.out.as_deref())?;
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
     let (file, members) = (args.set.load(anchor::path())?, members(&args.ensemble)?);
     let is_full = file.may_have_mode(SensorMode::Full, None);

@@ -26,7 +26,7 @@ use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes};
 use super::argument::Argument;
 use super::help::{examples, heading};
 use super::output::{command_line, during, outln, print_text, print_written, reading, warn, write_charts};
-use super::protect::{of_trajectories, protect};
+use super::protect::{must_be_folder, must_be_writable, of_trajectories, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
 
@@ -203,6 +203,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
 
 pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--openlabel", args.openlabel.as_deref())])?;
+    must_be_writable(args.openlabel.as_deref())?;
     let references = args.reference.as_deref().map(read_references).transpose()?;
     let mut tracks = reading(&args.file, || open(&args.file, args.read.options()))?;
     if args.criterion == CriterionChoice::Gradient && tracks.layout() != Layout::InCar {
@@ -261,6 +262,8 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     for chart in charts.iter().flatten() {
         protect(&inputs, &[("--plot", Some(chart))])?;
     }
+    [&args.record, &args.openlabel].into_iter().try_for_each(|file| must_be_writable(file.as_deref()))?;
+    must_be_folder(args.plot.as_deref())?;
     let file = reading(&args.file, || smooth_file(&args.file, args.read.options()))?;
     for warning in &file.warnings {
         warn(format_args!("{}: {warning}", args.file.display()));
@@ -305,6 +308,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 
 pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
+    must_be_writable(args.output.as_deref())?;
     let data_sets = args.data.read_all()?;
     let fit = if args.correlations { correlated } else { fit_distributions };
     let fitted = during("fitting distributions".to_owned(), || fit(&data_sets, args.seed));

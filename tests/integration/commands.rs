@@ -211,6 +211,14 @@ fn a_misspelt_or_negative_value_is_explained() {
             "for '--sample <SAMPLE>': expected a whole number from 0 to 18446744073709551615",
         ),
         (
+            ["traffic", "robustness", "traffic.csv", "--repetitions=0"],
+            "'0' for '--repetitions <REPETITIONS>': expected a whole number from 1 to 10000",
+        ),
+        (
+            ["study", "sensitivity", "paper-figure", "--rows=9999999"],
+            "'9999999' for '--rows <N>': expected a whole number from 1 to 2097152",
+        ),
+        (
             ["run", "paper-figur", "--seed", "1"],
             "there is no scenario `paper-figur`: no file and no scenario of the library",
         ),

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use crate::support::{closecall, code, folder, headline_with, json, library, message, stderr, stdout};
+use crate::support::{closecall, code, folder, headline_with, json, library, message, program, stderr, stdout};
 
 /// Writes a scenario file.
 fn write(folder: &tempfile::TempDir, text: &str) -> PathBuf {
@@ -78,6 +78,86 @@ fn a_folder_that_cannot_be_written_is_an_error_before_the_first_sample() {
     let args = ["campaign", headline.to_str().unwrap(), "-n", "100000000", "--out", out.to_str().unwrap()];
     let output = closecall(args);
     assert_eq!(code(&output), 6, "{}", stderr(&output));
+}
+
+/// The inputs are missing: a message about one of them would show that it was read first.
+#[test]
+fn an_output_that_cannot_be_written_is_refused_before_any_input_is_read() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (file, taken) = (path("file"), path("folder.csv"));
+    fs::write(&file, "in the way").unwrap();
+    fs::create_dir(&taken).unwrap();
+    let into_folder: [&[&str]; 14] = [
+        &["study", "sensitivity", "missing.toml", "--out"],
+        &["study", "frontier", "missing.toml", "--out"],
+        &["study", "boundary", "missing.toml", "--along", "a", "b", "-e", "min_thw_rear_s < 0.3", "--out"],
+        &["study", "anchor", "--ensemble", "missing.toml", "--out"],
+        &["study", "map", "--controller", "acc", "--out"],
+        &["study", "sensors", "missing.toml", "--out"],
+        &["traffic", "chain", "missing.csv", "--out"],
+        &["traffic", "criticality", "missing.csv", "--plot"],
+        &["traffic", "statistics", "missing.csv", "--plot"],
+        &["traffic", "robustness", "missing.csv", "--plot"],
+        &["traffic", "paper", "missing.csv", "--out"],
+        &["traffic", "sample", "missing.csv", "--vary", "cc1", "--to", "0.3", "--out"],
+        &["traffic", "aerial", "missing.csv", "--out"],
+        &["tool", "render", "--out"],
+    ];
+    let into_file: [&[&str]; 6] = [
+        &["traffic", "lane-changes", "missing.csv", "--openlabel"],
+        &["traffic", "criticality", "missing.csv", "--openlabel"],
+        &["traffic", "fit", "missing.csv", "--out"],
+        &["traffic", "reenact", "missing.csv", "--out"],
+        &["traffic", "calibrate", "missing.csv", "--out"],
+        &["traffic", "record", "paper-figure", "-n", "1000000", "--out"],
+    ];
+    let of_folder = into_folder.map(|words| (words, &file, "it is a file, and a folder is needed"));
+    let of_file = into_file.map(|words| (words, &taken, "it is a folder, and a file is needed"));
+    for (words, output, reason) in of_folder.into_iter().chain(of_file) {
+        let ended = closecall(words.iter().copied().chain([output.as_str()]));
+        assert_eq!(code(&ended), 6, "{words:?}: {}", stderr(&ended));
+        assert!(
+            message(&ended).contains(&format!("failed to write {output}: {reason}")),
+            "{words:?}: {}",
+            message(&ended)
+        );
+        assert!(ended.stdout.is_empty(), "{words:?}");
+    }
+    assert_eq!(fs::read_to_string(&file).unwrap(), "in the way");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count() + fs::read_dir(&taken).unwrap().count(), 2);
+}
+
+/// Pictures of two data sets in one folder are told apart by nobody.
+#[test]
+fn images_are_rendered_into_an_empty_folder_only() {
+    let folder = folder();
+    let images = folder.path().join("images");
+    let render = |more: &[&str]| {
+        let words = ["tool", "render", "-n", "1", "--out", images.to_str().unwrap()];
+        closecall(words.iter().chain(more))
+    };
+    assert!(stdout(&render(&[]), 0).starts_with("1 image of 1 scene\n"));
+    let files = || fs::read_dir(&images).unwrap().count();
+    let before = files();
+    let contents: [&[&str]; 3] = [&[], &["--aerial"], &["--crops"]];
+    for more in contents {
+        let again = render(more);
+        assert_eq!(code(&again), 2, "{}", stderr(&again));
+        assert!(message(&again).contains("images holds files already: name a new or an empty folder"));
+        assert_eq!(files(), before);
+    }
+}
+
+/// A reader that has gone, such as `head -1`, does not change what the exit code means.
+#[test]
+fn a_message_that_nobody_reads_keeps_its_exit_code() {
+    for words in [&["compare"][..], &["fly"], &["run", "nothing-of-this-name"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let status = program().args(words).stderr(writer).status().unwrap();
+        assert_eq!(status.code(), Some(2), "{words:?}");
+    }
 }
 
 #[test]

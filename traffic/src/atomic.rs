@@ -49,13 +49,29 @@ pub fn write_texts(
 /// # Errors
 /// [`WriteError`] if the folder cannot be created, or a file has its name.
 pub fn create_folder(path: &Path) -> Result<(), WriteError> {
-    std::fs::create_dir_all(path).map_err(|source| {
-        let reason = match source.kind() {
-            io::ErrorKind::AlreadyExists => io::Error::new(source.kind(), "it is a file, and a folder is needed"),
-            _ => source,
-        };
-        WriteError::new(path, reason)
+    std::fs::create_dir_all(path).map_err(|source| match source.kind() {
+        io::ErrorKind::AlreadyExists => not_a_folder(path),
+        _ => WriteError::new(path, source),
     })
+}
+
+/// Checks that files can be created in the folder `path`, which need not exist yet, so that a long
+/// computation does not fail only when it saves its result. Nothing is left behind.
+///
+/// # Errors
+/// [`WriteError`] if the folder cannot be created or written, or a file has its name.
+pub fn check_folder(path: &Path) -> Result<(), WriteError> {
+    let mut folders = path.ancestors();
+    let nearest = folders.find(|folder| folder.symlink_metadata().is_ok()).unwrap_or(Path::new("."));
+    if !nearest.is_dir() {
+        return Err(not_a_folder(nearest));
+    }
+    temporary_in(nearest).map(drop).map_err(|source| WriteError::new(path, source))
+}
+
+/// Returns the failure to use a file as a folder.
+fn not_a_folder(path: &Path) -> WriteError {
+    WriteError::new(path, io::Error::new(io::ErrorKind::NotADirectory, "it is a file, and a folder is needed"))
 }
 
 /// Writes a file as [`write_atomically`] does, and names it if that fails.
@@ -95,8 +111,12 @@ pub fn write_atomically<E: From<io::Error>>(
 /// it saves its result.
 ///
 /// # Errors
-/// [`WriteError`] if no file can be created in the folder of `path`.
+/// [`WriteError`] if no file can be created in the folder of `path`, or a folder has its name.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    if path.is_dir() {
+        let reason = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, and a file is needed");
+        return Err(WriteError::new(path, reason));
+    }
     temporary_in(parent_folder(path)).map(drop).map_err(|source| WriteError::new(path, source))
 }
 
@@ -170,6 +190,23 @@ mod tests {
         let error = create_folder(&path).unwrap_err().to_string();
         assert!(error.ends_with("results: it is a file, and a folder is needed"), "{error}");
         assert!(create_folder(&folder.path().join("a").join("b")).is_ok() && create_folder(folder.path()).is_ok());
+    }
+
+    #[test]
+    fn a_folder_is_checked_before_it_exists() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.csv");
+        std::fs::write(&file, "text").unwrap();
+        for wrong in [file.clone(), file.join("below").join("it")] {
+            let error = check_folder(&wrong).unwrap_err().to_string();
+            assert!(error.ends_with("a.csv: it is a file, and a folder is needed"), "{error}");
+        }
+        let new = folder.path().join("new").join("below");
+        assert!(check_folder(&new).is_ok() && check_folder(folder.path()).is_ok());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        let error = check_writable(folder.path()).unwrap_err().to_string();
+        assert!(error.ends_with(": it is a folder, and a file is needed"), "{error}");
+        assert!(check_writable(&file).is_ok());
     }
 
     #[test]

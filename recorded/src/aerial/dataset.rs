@@ -16,6 +16,7 @@ use std::path::Path;
 use closecall_sensors::camera::Image;
 use closecall_sensors::datasets::Set;
 use closecall_traffic::atomic::write_file;
+use closecall_traffic::words::counted;
 use closecall_traffic::{ActorId, VehicleClass, stream};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -58,7 +59,8 @@ pub struct AerialDatasetSummary {
 impl fmt::Display for AerialDatasetSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { pictures, cars, trucks, difficult } = self;
-        write!(f, "{pictures} images with {cars} cars and {trucks} trucks, {difficult} of them difficult,")
+        let (pictures, cars, trucks) = (counted(*pictures, "image"), counted(*cars, "car"), counted(*trucks, "truck"));
+        write!(f, "{pictures} with {cars} and {trucks}, {difficult} of them difficult")
     }
 }
 

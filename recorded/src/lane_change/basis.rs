@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
+use closecall_traffic::words::counted;
 use closecall_traffic::{Lane, Trajectory};
 
 use super::{Criterion, LaneReliability};
@@ -131,10 +132,10 @@ impl fmt::Display for DetectionBasis {
                     .collect();
                 write!(
                     f,
-                    "lanes: {} recorded, {width_m:.2} m wide, {} markings known, {} changes of the recorded lane",
+                    "lanes: {} recorded, {width_m:.2} m wide, {} known, {} of the recorded lane",
                     self.recorded_lanes.len(),
-                    lanes.len(),
-                    self.recorded_crossings
+                    counted(lanes.len(), "marking"),
+                    counted(self.recorded_crossings, "change")
                 )
             }
         }
@@ -169,6 +170,6 @@ mod tests {
         let track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let basis = basis(Criterion::Distance, LaneReliability::Reliable, vec![track]);
         assert_eq!(basis.warnings(), [""; 0]);
-        assert!(basis.to_string().starts_with("lanes: 2 recorded, 3.43 m wide, 1 markings known"), "{basis}");
+        assert!(basis.to_string().starts_with("lanes: 2 recorded, 3.43 m wide, 1 marking known"), "{basis}");
     }
 }

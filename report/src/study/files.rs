@@ -7,7 +7,7 @@ use closecall_campaign::boundary::Boundary;
 use closecall_campaign::frontier::Frontier;
 use closecall_campaign::sensitivity::{FactorKind, RunErrors, Sensitivity};
 use closecall_studies::anchor::{Anchor, Quantity, Row};
-use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::atomic::{WriteError, create_folder, write_file};
 use closecall_traffic::words::counted;
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
@@ -111,7 +111,7 @@ pub fn write_study(folder: &Path, study: &Study) -> Result<Vec<PathBuf>, WriteEr
             ("anchor", "anchor", charts, page)
         }
     };
-    std::fs::create_dir_all(folder).map_err(fail)?;
+    create_folder(folder)?;
     let mut files =
         vec![(format!("{name}.html"), page.into_string()), (format!("{name}.json"), format!("{:#}\n", study.json()))];
     files.extend(charts.into_iter().map(|(name, svg)| (format!("{chart_name}-{name}.svg"), svg)));
