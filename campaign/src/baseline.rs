@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::folder::{Folder, FolderError};
+use crate::folder_error::json_fault;
 use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
@@ -135,7 +136,9 @@ impl Baseline {
         let text = read_text(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
         let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };
         // The version comes first: another layout has other keys.
-        let value: Value = serde_json::from_str(&text).map_err(|error| content(error.line(), error.to_string()))?;
+        let value: Value = serde_json::from_str(&text).map_err(|error| {
+            content(error.line(), format!("the file is not a baseline: {}", json_fault(&text, &error)))
+        })?;
         if value["schema_version"] != BASELINE_VERSION {
             return Err(content(1, format!("the file is not a baseline of version {BASELINE_VERSION}")));
         }
@@ -424,6 +427,20 @@ mod tests {
         // Only the layout of the text may change.
         std::fs::write(&path, text.replace('\n', "").replace("  ", "")).unwrap();
         assert!(Baseline::read(&path).is_ok());
+    }
+
+    #[test]
+    fn another_file_is_said_to_be_no_baseline() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("baseline.json");
+        let cases =
+            [("", "it is empty"), ("{\"a\": 1}", "of version 3"), ("a = 1", "is not a baseline: expected value")];
+        for (text, expected) in cases {
+            std::fs::write(&path, text).unwrap();
+            let error = Baseline::read(&path).unwrap_err().to_string();
+            assert!(error.contains("baseline.json:1: the file is not a baseline"), "{error}");
+            assert!(error.contains(expected), "{error}");
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use closecall_scenarios::ScenarioError;
 use closecall_simulation::controller::native::NativeError;
+use closecall_traffic::input::is_of_content;
 
 use super::campaign_error::CampaignError;
 use super::compare::CompareError;
@@ -28,8 +29,9 @@ impl From<&ScenarioError> for FailureKind {
     fn from(error: &ScenarioError) -> Self {
         match error {
             ScenarioError::Set { .. } | ScenarioError::Unknown { .. } => Self::Usage,
-            ScenarioError::Read { .. } => Self::Io,
-            ScenarioError::NotText { .. }
+            ScenarioError::Read { .. } if error.is_io() => Self::Io,
+            ScenarioError::Read { .. }
+            | ScenarioError::NotText { .. }
             | ScenarioError::TooLarge { .. }
             | ScenarioError::Empty { .. }
             | ScenarioError::Syntax { .. }
@@ -55,6 +57,7 @@ impl From<&NativeError> for FailureKind {
 impl From<&FolderError> for FailureKind {
     fn from(error: &FolderError) -> Self {
         match error {
+            FolderError::Read { source, .. } if is_of_content(source) => Self::InvalidInput,
             FolderError::Write(_) | FolderError::Read { .. } | FolderError::Busy { .. } => Self::Io,
             FolderError::AlreadyThere { .. }
             | FolderError::OtherCampaign { .. }

@@ -36,6 +36,7 @@ use super::saved_error::SavedError;
 use super::trust;
 use super::wall_times::{self, WallTime, WallTimes};
 
+use crate::folder_error::json_fault;
 pub use crate::folder_error::{FolderError, listed};
 
 /// The file of a campaign's folder that says how the campaign was made.
@@ -277,7 +278,7 @@ impl Folder {
         }
         let text = read_text(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
         let content = |line, message| FolderError::Content { path: path.clone(), line, message };
-        let not_json = |error: serde_json::Error| content(error.line(), error.to_string());
+        let not_json = |error: serde_json::Error| content(error.line(), json_fault(&text, &error));
         let value: serde_json::Value = serde_json::from_str(&text).map_err(not_json)?;
         match value.get("manifest_version").and_then(serde_json::Value::as_u64) {
             Some(version) if version == u64::from(MANIFEST_VERSION) => {

@@ -19,6 +19,11 @@ pub fn listed(differences: &[String]) -> String {
     lines.join("\n  ")
 }
 
+/// Returns what is wrong with a text that is not the JSON of a file.
+pub(crate) fn json_fault(text: &str, error: &serde_json::Error) -> String {
+    if text.trim().is_empty() { "it is empty".to_owned() } else { error.to_string() }
+}
+
 /// The reason for which a campaign's folder cannot be used. The folder is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {

@@ -117,8 +117,8 @@ pub enum ScenarioError {
 
 impl ScenarioError {
     /// Returns whether the file cannot be read at all.
-    pub const fn is_io(&self) -> bool {
-        matches!(self, Self::Read { .. })
+    pub fn is_io(&self) -> bool {
+        matches!(self, Self::Read { source, .. } if !input::is_of_content(source))
     }
 
     /// Returns whether a setting is wrong, and not the file.

@@ -42,6 +42,7 @@ use closecall_studies::fidelity::FidelityError;
 use closecall_studies::perception::StudyError;
 use closecall_studies::perception::recorded::RecordedStudyError;
 use closecall_traffic::atomic::WriteError;
+use closecall_traffic::input::is_of_content;
 
 use super::argument::Argument;
 use super::view_error::ViewError;
@@ -413,6 +414,7 @@ impl From<&CliError> for ExitCode {
                 | AerialError::Pose(_)
                 | AerialError::Stream(_),
             ) => Self::Io,
+            CliError::Member(MemberError::Read { source, .. }) if is_of_content(source) => Self::InvalidInput,
             CliError::Member(MemberError::Read { .. }) | CliError::Following(FollowingError::Read { .. }) => Self::Io,
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,

@@ -68,6 +68,38 @@ fn a_dash_in_place_of_a_recording_is_said_to_be_no_standard_input() {
     assert!(message(&output).contains("there are no rows"), "{}", message(&output));
 }
 
+/// The system has read the file, so that no right and no disk is at fault.
+#[test]
+fn a_file_that_is_no_text_is_an_invalid_input_in_every_command() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (file, traffic, campaign) = (path("odd.toml"), path("traffic.csv"), path("campaign"));
+    fs::write(&file, b"\xff\xfe\x00binary").unwrap();
+    fs::create_dir(&campaign).unwrap();
+    fs::copy(&file, path("campaign/manifest.json")).unwrap();
+    stdout(&closecall(["traffic", "record", "overtake-without-brake", "-n", "1", "-o", &traffic]), 0);
+    let cases: [&[&str]; 9] = [
+        &["check", &file],
+        &["run", "paper-figure", "--fitted", &file],
+        &["campaign", "paper-figure", "--no-gate", "--ensemble", &file],
+        &["campaign", "paper-figure", "--no-gate", "--failures-first", &file],
+        &["traffic", "drift", &file, &traffic],
+        &["traffic", "calibrate", &file],
+        &["explain", &campaign],
+        &["replay", &campaign, "0"],
+        &["baseline", "compare", &campaign, &file],
+    ];
+    for case in cases {
+        let output = closecall(case);
+        assert_eq!(code(&output), 3, "{case:?}: {}", stderr(&output));
+        assert!(message(&output).contains("text"), "{case:?}: {}", message(&output));
+        // A file that is not there is another fault.
+        let missing =
+            closecall(case.iter().map(|word| word.replace(&file, &path("no.toml")).replace(&campaign, &path("no"))));
+        assert_ne!(code(&missing), 3, "{case:?}: {}", stderr(&missing));
+    }
+}
+
 #[test]
 #[cfg(unix)]
 fn an_endless_input_is_refused() {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::criteria::{Expression, GateConfig};
 use closecall_scenarios::source::PROJECT_FILE;
-use closecall_traffic::input::read_text;
+use closecall_traffic::input::{is_of_content, read_text};
 use serde::Deserialize;
 
 use super::{GateSet, GateSource, GateSpec, ProbabilitySpec};
@@ -67,7 +67,7 @@ impl ProjectFile {
 
     fn read(path: &Path) -> Result<Self, ProjectError> {
         let fail = |message: String, is_io| ProjectError { path: path.to_owned(), message, is_io };
-        let text = read_text(path).map_err(|error| fail(error.to_string(), error.kind() != ErrorKind::InvalidData))?;
+        let text = read_text(path).map_err(|error| fail(error.to_string(), !is_of_content(&error)))?;
         let config: ProjectConfig = toml::from_str(&text).map_err(|error| fail(error.to_string(), false))?;
         if let Some([first, second]) = Expression::contradiction(&config.gate.require) {
             return Err(fail(format!("`gate.require`: `{first}` and `{second}` contradict each other"), false));

@@ -99,8 +99,10 @@ pub fn read(paths: &[PathBuf]) -> Result<FollowingData, FollowingError> {
 fn read_one(path: &Path) -> Result<Pairs, LineError> {
     let fail = |error: std::io::Error| LineError { line: None, message: error.to_string() };
     let mut reader = opened(path).map_err(fail)?;
-    let mut first = String::new();
-    reader.read_line(&mut first).map_err(fail)?;
+    let mut first = Vec::new();
+    reader.read_until(b'\n', &mut first).map_err(fail)?;
+    let no_text = |_| LineError { line: Some(1), message: "it is not text (UTF-8)".to_owned() };
+    let first = String::from_utf8(first).map_err(no_text)?;
     let rest = Box::new(std::io::Cursor::new(first.clone().into_bytes()).chain(reader));
     if first.starts_with("pair_id,") {
         pair_table::read(rest)
@@ -108,8 +110,9 @@ fn read_one(path: &Path) -> Result<Pairs, LineError> {
         platoon::read(rest)
     } else {
         let shown: String = first.trim_end().chars().take(40).collect();
+        let begin = if shown.is_empty() { "an empty line".to_owned() } else { format!("`{shown}`") };
         let message = format!(
-            "`{shown}` begins no known layout: expected `pair_id,…` (a table of pairs) or `Date,…` (a platoon of OpenACC)"
+            "{begin} begins no known layout: expected `pair_id,…` (a table of pairs) or `Date,…` (a platoon of OpenACC)"
         );
         Err(LineError { line: Some(1), message })
     }
