@@ -192,6 +192,31 @@ pub fn table(text: &str) -> Result<PathBuf, String> {
     }
 }
 
+/// Parses the path of a Parquet table, whose extension must be .parquet.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn parquet(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(extension) if extension == "parquet" => Ok(path),
+        _ => Err(format!("`{text}` must end with .parquet")),
+    }
+}
+
+/// Parses the path of recorded scans, whose extension must be .parquet for a table or .pcd for a
+/// folder.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn scans(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("parquet" | "pcd") => Ok(path),
+        _ => Err(format!("`{text}` must end with .parquet, for a table, or with .pcd, for a folder")),
+    }
+}
+
 /// Parses the path of a recording, whose extension must be .rrd.
 ///
 /// # Errors

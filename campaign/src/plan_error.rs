@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
+use closecall_scenarios::source::same_name;
 use closecall_simulation::controller::native::NativeError;
 
 /// The reason for which scenarios cannot form a campaign.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
     /// Two scenarios have the same name, by which results are filed.
-    #[error("{} and {} have the same name `{name}`", first.display(), second.display())]
+    #[error("{}", same_name(first, second, name))]
     SameName {
         /// One file.
         first: PathBuf,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::source::{PROJECT_FILE, SCENARIOS};
 use closecall_scenarios::strict_schema;
-use closecall_traffic::atomic::WriteError;
+use closecall_traffic::atomic::{WriteError, create_folder};
 
 const SCENARIO: &str = include_str!("repository/scenario.toml");
 const PROJECT: &str = include_str!("repository/closecall.toml");
@@ -86,11 +86,15 @@ fn has_scenario(folder: &Path) -> bool {
 /// [`WriteError`] if the folder or the file cannot be written.
 pub fn create(path: &Path, text: &str) -> Result<bool, WriteError> {
     let fail = |source| WriteError::new(path, source);
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(fail)?;
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        create_folder(folder)?;
     }
     match OpenOptions::new().write(true).create_new(true).open(path) {
-        Ok(mut file) => file.write_all(text.as_bytes()).map(|()| true).map_err(fail),
+        Ok(mut file) => file.write_all(text.as_bytes()).map(|()| true).map_err(|error| {
+            // Half a file would be taken for one of the user's own.
+            drop(std::fs::remove_file(path));
+            fail(error)
+        }),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(false),
         Err(error) => Err(fail(error)),
     }

@@ -50,6 +50,15 @@ pub enum SourceError {
     Scenario(#[from] ScenarioError),
 }
 
+/// Returns the message about two files whose names are the same, or about one file that is named
+/// twice.
+pub fn same_name(first: &Path, second: &Path, name: &str) -> String {
+    match first == second {
+        true => format!("{} is named twice", first.display()),
+        false => format!("{} and {} have the same name `{name}`", first.display(), second.display()),
+    }
+}
+
 /// Returns the scenarios that the arguments of a command name: each folder is replaced by the
 /// scenario files in it.
 ///

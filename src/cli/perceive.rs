@@ -7,20 +7,18 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_recorded::scans::{Labels, Recording, ScanOptions};
 use closecall_report::perception::RecordedReport;
 use closecall_report::tables::TrackRecorder;
-use closecall_report::tables::table::check_parquet;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::RecordedPerception;
 use closecall_sensors::lidar::PointFrame;
 use closecall_simulation::RunKey;
 use closecall_studies::perception::recorded::{RecordedInput, study_recording};
-use closecall_traffic::atomic::check_writable;
 
 use super::CliError;
 use super::args::{Format, SetArgs};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, print_written, reading};
-use super::protect::protect;
+use super::protect::{must_be_writable, protect};
 use crate::exit_code::ExitCode;
 
 /// Frame of recorded points.
@@ -89,7 +87,7 @@ pub(super) struct PerceiveArgs {
     #[command(flatten)]
     set: SetArgs,
     /// Write the tracks: a table with one row per control step and track, with the columns of `run`
-    #[arg(long, value_name = "FILE.parquet", help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "FILE.parquet", value_parser = closecall_campaign::arguments::parquet, help_heading = heading::OUTPUT)]
     tracks: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
@@ -137,10 +135,7 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
     let inputs = [Some(&args.recording), args.poses.as_ref(), args.labels.as_ref()];
     let inputs: Vec<PathBuf> = inputs.into_iter().flatten().cloned().collect();
     protect(&inputs, &[("--tracks", args.tracks.as_deref())])?;
-    if let Some(tracks) = &args.tracks {
-        check_parquet(tracks, "tracks are a file *.parquet")?;
-        check_writable(tracks)?;
-    }
+    must_be_writable(args.tracks.as_deref())?;
     let file = args.set.load(&args.scenario)?;
     let (scenario, key) = args.concrete(&file)?;
     let options = args.options(&scenario);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use closecall_campaign::arguments::{recording, table};
+use closecall_campaign::arguments::{parquet, recording, scans, table};
 use closecall_campaign::runner::run_guarded;
 use closecall_report::exchange::OsiRecorder;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
@@ -56,13 +56,13 @@ pub(super) struct WatchArgs {
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table, help_heading = heading::OUTPUT)]
     pub(super) trace: Option<PathBuf>,
     /// Write every return of the LiDARs (mode `full`) of the same run: a table with beam, range, position, intensity, time, box and truth, or a new folder with a point cloud for each scan
-    #[arg(long, value_name = "FILE.parquet|FOLDER.pcd", help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "FILE.parquet|FOLDER.pcd", value_parser = scans, help_heading = heading::OUTPUT)]
     pub(super) scans: Option<PathBuf>,
     /// Write the tracks of the same run: a table with one row per control step and track, with state, covariance, class, and the vehicle that it is matched with
-    #[arg(long, value_name = "FILE.parquet", help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "FILE.parquet", value_parser = parquet, help_heading = heading::OUTPUT)]
     pub(super) tracks: Option<PathBuf>,
     /// Write the clusters and boxes of the LiDARs (mode `full`) of the same run before any is rejected: a table with what the tracker has made of each
-    #[arg(long, value_name = "FILE.parquet", help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "FILE.parquet", value_parser = parquet, help_heading = heading::OUTPUT)]
     pub(super) clusters: Option<PathBuf>,
     /// Write the same run as messages of ASAM OSI 3.8, `GroundTruth` and `SensorData` of each control step: one MCAP file with the map, or a
     /// trace file for each type, whose name begins with date and type and ends with the name of FILE

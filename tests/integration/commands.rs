@@ -242,6 +242,12 @@ fn a_wrong_path_is_named_with_what_it_is() {
     let written = closecall(["campaign", "paper-figure", "-n", "1", "--no-gate", "--out", file.to_str().unwrap()]);
     assert_eq!(code(&written), 6);
     assert!(message(&written).contains("results: it is a file, and a folder is needed"), "{}", message(&written));
+    let below = closecall(["init", file.to_str().unwrap()]);
+    assert_eq!(code(&below), 6);
+    assert!(message(&below).contains("results: it is a file, and a folder is needed"), "{}", message(&below));
+    let twice = closecall(["campaign", "paper-figure", "paper-figure", "-n", "1", "--no-gate"]);
+    assert_eq!(code(&twice), 2);
+    assert!(message(&twice).contains("paper-figure.toml is named twice"), "{}", message(&twice));
     let odd = closecall([OsStr::new("run"), OsStr::from_bytes(b"nope\xff")]);
     assert_eq!(code(&odd), 2);
     assert!(message(&odd).contains("there is no scenario `nope\u{fffd}`"), "{}", message(&odd));

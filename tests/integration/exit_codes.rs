@@ -211,6 +211,10 @@ fn wrong_usage_ends_with_2() {
         vec!["run", headline, "--set", "actor.rear=3"],
         vec!["run", headline, "--set", "no-such-parameter=3"],
         vec!["run", headline, "--trace", "trace.txt"],
+        vec!["run", headline, "--scans", "scans.csv"],
+        vec!["run", headline, "--tracks", "tracks.csv"],
+        vec!["run", headline, "--clusters", "clusters"],
+        vec!["study", "perceive", "scans.parquet", "--tracks", "tracks.csv"],
         vec!["run", headline, "--trace", "same.csv", "--record", "same.csv"],
         vec!["fly"],
     ] {

@@ -44,11 +44,20 @@ impl fmt::Display for KeyPath {
     }
 }
 
+/// Returns a number in at most some twenty digits: 1e300 has three hundred when it is written out.
+fn short(value: f64) -> String {
+    const WRITTEN_OUT: std::ops::Range<f64> = 1e-6..1e16;
+    match value == 0.0 || !value.is_finite() || WRITTEN_OUT.contains(&value.abs()) {
+        true => value.to_string(),
+        false => format!("{value:e}"),
+    }
+}
+
 /// The reason why a value is wrong.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
     /// A number is outside its range.
-    #[error("is {value}, but {allowed} is needed")]
+    #[error("is {}, but {allowed} is needed", short(*value))]
     OutOfRange {
         /// The number found.
         value: f64,
@@ -238,5 +247,9 @@ mod tests {
     fn an_error_names_the_place_and_the_fault() {
         let error = Range::UNIT.check(1.5, "existence").unwrap_err().within("driver").within_index(2).within("actor");
         assert_eq!(error.to_string(), "`actor[2].driver.existence` is 1.5, but a number from 0 to 1 is needed");
+        for (value, text) in [(-1e300, "-1e300"), (1e9, "1000000000"), (f64::NAN, "NaN"), (-2.5e-9, "-2.5e-9")] {
+            let error = Range::UNIT.check(value, "existence").unwrap_err().to_string();
+            assert!(error.starts_with(&format!("`existence` is {text}, but")), "{error}");
+        }
     }
 }

@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use super::keys::{KINDS, MODELS, unknown};
 use crate::locate::line_at;
+use crate::source::same_name;
 
 /// The version of the member files that this program reads.
 const SCHEMA_VERSION: u32 = 1;
@@ -44,7 +45,7 @@ pub enum MemberError {
         message: String,
     },
     /// Two members have the same name.
-    #[error("{} and {} have the same name `{name}`", first.display(), second.display())]
+    #[error("{}", same_name(first, second, name))]
     SameName {
         /// One file.
         first: PathBuf,

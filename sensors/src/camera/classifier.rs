@@ -9,6 +9,7 @@
 //! a temperature) and softmax are part of the graph. `xtask/training/train.py` trained and exported
 //! it, and `models/MODEL_CARD.md` reports its accuracy.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -48,11 +49,20 @@ impl Backend {
     }
 }
 
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tract => f.write_str("tract"),
+            Self::OnnxRuntime(path) => write!(f, "ONNX Runtime ({})", path.display()),
+        }
+    }
+}
+
 /// The reason why a classifier cannot be set up or run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ClassifierError {
     /// The shared library does not exist, or is not an ONNX Runtime of a suitable version.
-    #[error("failed to load the inference backend {backend:?}: {reason}")]
+    #[error("failed to load the inference backend {backend}: {reason}")]
     Load {
         /// The requested backend.
         backend: Backend,
@@ -60,7 +70,7 @@ pub enum ClassifierError {
         reason: String,
     },
     /// The process already uses another backend.
-    #[error("failed to switch to the inference backend {asked:?}: this process has {chosen:?}")]
+    #[error("failed to switch to the inference backend {asked}: this process has {chosen}")]
     Switch {
         /// The backend that the process uses.
         chosen: Backend,
@@ -277,6 +287,8 @@ mod tests {
         assert!(Classifier::shipped(&Backend::Tract).is_ok());
         let asked = Backend::OnnxRuntime("/nowhere/libonnxruntime.so".into());
         let error = Classifier::shipped(&asked).unwrap_err();
+        let said = "failed to switch to the inference backend ONNX Runtime (/nowhere/libonnxruntime.so): this process has tract";
+        assert_eq!(error.to_string(), said);
         assert_eq!(error, ClassifierError::Switch { chosen: Backend::Tract, asked });
     }
 
