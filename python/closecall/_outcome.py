@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import _native
+from ._errors import UsageError
 
 Side = Literal["front", "rear", "left", "right"]
 Phase = Literal["approach", "critical", "overtaking", "after"]
@@ -215,7 +216,12 @@ class Outcome(_Readable):
         return self._of_run().figure()
 
     def record(self, path: str | os.PathLike[str]) -> None:
-        """Writes a recording (Rerun file), as ``closecall run --record`` does, without the raw data of the sensors."""
+        """Writes a recording (Rerun file), as ``closecall run --record`` does, without the raw data of the sensors.
+
+        Raises :class:`UsageError` if the name of the file does not end with ``.rrd``.
+        """
+        if Path(path).suffix != ".rrd":
+            raise UsageError(f"path: `{os.fspath(path)}` must end with .rrd")
         self._of_run().record(os.fspath(path))
 
     def viewer(self) -> Any:

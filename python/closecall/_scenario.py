@@ -63,7 +63,7 @@ class Scenario:
 
         ``campaign(scenario, n=n, seed=seed, design=design)`` runs the same samples. A grid may have fewer samples.
         """
-        return self._native.sample(seed, n, design)
+        return self._native.sample(whole("seed", seed), whole("n", n), design)
 
     def __repr__(self) -> str:
         return f"Scenario({self.name!r}, {len(self.parameters)} parameters)"
@@ -77,7 +77,7 @@ def _toml(value: object) -> str:
 
 
 def whole(name: str, value: int) -> int:
-    """Returns a seed or the number of a sample, which is a whole number from 0 to 2^64 - 1."""
+    """Returns a seed, the number of a sample, or a number of samples, which is a whole number from 0 to 2^64 - 1."""
     try:
         number = int(value)
     except (TypeError, ValueError, OverflowError):

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from . import _native
 from ._command import call
+from ._errors import UsageError
 from ._scenario import whole
 
 PathLike = str | os.PathLike[str]
@@ -91,6 +92,8 @@ def fit(
     ``interval_95``, ``quantiles``, ``n`` and ``goodness_of_fit``.
     """
     several = [files] if isinstance(files, (str, os.PathLike)) else list(files)
+    if not several:
+        raise UsageError("files: expected at least one trajectory file, not an empty list")
     named = {"files": several, "output": output, "provenance": provenance, "correlations": correlations, "seed": whole("seed", seed)}
     _, result = call("fit", {**named, "layout": layout, "drop_bad_rows": drop_bad_rows})
     return dict(result)

@@ -69,6 +69,18 @@ def test_samples_are_those_of_a_run() -> None:
     assert samples[2]["brake-mps2"] == 6.0
     assert sorted(samples[0]) == sorted(scenario.parameters)
     assert SCENARIO in cc.Scenario.library()
+    assert scenario.sample(n=0) == []
+    for seed, n in [(-1, 1), (0, -3), (0.5, 1), (0, "three")]:
+        with pytest.raises(cc.UsageError, match="expected a whole number from 0"):
+            scenario.sample(seed=seed, n=n)  # type: ignore[arg-type]
+
+
+def test_a_recording_has_the_name_of_one(tmp_path: Path) -> None:
+    outcome = cc.run(SCENARIO, controller="mis", seed=4, sample=2, sensors="object")
+    file = tmp_path / "run.txt"
+    with pytest.raises(cc.UsageError, match="must end with .rrd"):
+        outcome.record(file)
+    assert not file.exists()
 
 
 def test_a_bad_scenario_names_file_line_and_key(tmp_path: Path) -> None:
@@ -115,6 +127,7 @@ def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> Non
         (lambda: cc.lane_changes(file, criterion="gradient"), "use `peak` or `distance` as criterion="),
         (lambda: cc.criticality(file, speed_limit_mps=-3), "speed_limit_mps=: `-3` is not a number above 0"),
         (lambda: cc.fit(file, seed=-1), "seed: expected a whole number"),
+        (lambda: cc.fit([]), "files: expected at least one trajectory file"),
     ]:
         with pytest.raises(cc.UsageError, match=message):
             call()
