@@ -153,8 +153,8 @@ fn check_campaigns(paths: &[&PathBuf], format: Format) -> ExitCode {
 fn print(file: Result<ScenarioFile, ScenarioError>, path: &Path) {
     match file {
         Ok(file) => {
-            let count = file.space().iter().len();
-            textln!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
+            let parameters = counted(file.space().iter().len(), "parameter");
+            textln!("{}: valid, {} with {parameters}", path.display(), file.config().name);
         }
         Err(error) => print_failure(error.into()),
     }

@@ -95,7 +95,8 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let (log, changes) = recorder.finish();
     write_in_car(&log, &args.output)?;
     write_ground_truth(&changes, &truth)?;
-    outln!("{} rows of the in-car log of {chosen}, {} true lane changes", log.frames.len(), changes.len());
+    let (rows, true_changes) = (counted(log.frames.len(), "row"), counted(changes.len(), "true lane change"));
+    outln!("{rows} of the in-car log of {chosen}, {true_changes}");
     print_written(&args.output);
     print_written(&truth);
     Ok(ExitCode::Pass)

@@ -10,6 +10,7 @@ use closecall_report::run::text::outcome_line;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
+use closecall_traffic::words::counted;
 
 use super::CliError;
 use super::args::{FittedArgs, SetArgs};
@@ -101,7 +102,7 @@ fn round(path: &Path, (set, fitted): (&SetArgs, &FittedArgs), args: &WatchingArg
     let (set, of_arms) = set.by_arm();
     let file = fitted.load(path, &set)?;
     let (name, parameters) = (&file.config().name, file.space().iter().len());
-    textln!("{}: valid, {name} with {parameters} parameters", path.display());
+    textln!("{}: valid, {name} with {}", path.display(), counted(parameters, "parameter"));
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
     let arms = args.comparison.arms(&args.arm, &file, &of_arms)?;
     for sample in 0..args.samples {
