@@ -121,11 +121,11 @@ impl ScenarioConfig {
         // The entry of an ensemble is named SCENARIO@MEMBER.
         let (name, member) = self.name.split_once('@').map_or((&self.name[..], None), |(name, of)| (name, Some(of)));
         if ActorId::new(name).is_err() || member.is_some_and(|member| ActorId::new(member).is_err()) {
-            let allowed = "lower-case letters, digits and hyphens, starting with a letter".to_owned();
+            let allowed = "the names of lower-case letters, digits and hyphens, starting with a letter,".to_owned();
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
         if self.name.len() > MOST_NAME_BYTES {
-            let allowed = format!("names of at most {MOST_NAME_BYTES} characters, which also name files");
+            let allowed = format!("the names of at most {MOST_NAME_BYTES} characters, which also name files,");
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
         self.check_requirements()?;
@@ -164,7 +164,8 @@ impl ScenarioConfig {
         for (index, requirement) in self.requirements.iter().enumerate() {
             let at = |problem| Err(ConfigError::new("requirements", problem).within_index(index));
             if !is_identifier(requirement) {
-                let allowed = "letters, digits, `-`, `.` and `_`, starting with a letter or digit".to_owned();
+                let allowed =
+                    "the names of letters, digits, `-`, `.` and `_`, starting with a letter or digit,".to_owned();
                 return at(Problem::UnknownWord { value: requirement.clone(), allowed });
             }
             if self.requirements[..index].contains(requirement) {

@@ -112,8 +112,8 @@ pub(super) struct FrontierArgs {
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall study boundary slow-approach --along closing-mps cut-out-thw-s -e \"min_thw_rear_s<0.3\"",
-    "closecall study boundary slow-approach --along closing-mps reaction-s -e \"min_gap_rear_m<2\" -o out",
-    "closecall study boundary slow-approach --along closing-mps=2..2.5 rear-cc1-s -e \"min_gap_rear_m<3\"",
+    "closecall study boundary slow-approach --along closing-mps rear-cc1-s -e \"min_ttc_rear_s<5\" -o out",
+    "closecall study boundary slow-approach --along closing-mps=2..2.5 rear-cc1-s -e \"min_ttc_rear_s<5\"",
 ]))]
 pub(super) struct BoundaryArgs {
     #[command(flatten)]
