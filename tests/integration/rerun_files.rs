@@ -90,6 +90,7 @@ fn a_full_disk_is_an_error_and_leaves_no_part_of_a_recording() {
     assert_eq!(code(&limited), 6, "{}", stderr(&limited));
     let message = stderr(&limited);
     assert!(message.contains("run.rrd") && message.to_lowercase().contains("file too large"), "{message}");
+    assert!(!message.contains("at path"), "the temporary file is no concern of the user: {message}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 

@@ -99,9 +99,11 @@ pub fn write_atomically<E: From<io::Error>>(
     content: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), E>,
 ) -> Result<(), E> {
     let folder = parent_folder(path);
-    let mut file = BufWriter::new(temporary_in(folder)?);
-    content(&mut file)?;
-    let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+    let file = temporary_in(folder)?;
+    // An error of the file itself does not name the temporary path.
+    let mut writer = BufWriter::new(file.as_file());
+    content(&mut writer)?;
+    writer.into_inner().map_err(io::IntoInnerError::into_error)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
     Ok(sync_folder(folder)?)
