@@ -110,7 +110,7 @@ fn an_output_that_cannot_be_written_is_refused_before_any_input_is_read() {
         &["traffic", "fit", "missing.csv", "--out"],
         &["traffic", "reenact", "missing.csv", "--out"],
         &["traffic", "calibrate", "missing.csv", "--out"],
-        &["traffic", "record", "paper-figure", "-n", "1000000", "--out"],
+        &["traffic", "record", "paper-figure", "-n", "100000", "--out"],
     ];
     let of_folder = into_folder.map(|words| (words, &file, "it is a file, and a folder is needed"));
     let of_file = into_file.map(|words| (words, &taken, "it is a folder, and a file is needed"));

@@ -287,8 +287,8 @@ mod tests {
         assert!(Classifier::shipped(&Backend::Tract).is_ok());
         let asked = Backend::OnnxRuntime("/nowhere/libonnxruntime.so".into());
         let error = Classifier::shipped(&asked).unwrap_err();
-        let said = "failed to switch to the inference backend ONNX Runtime (/nowhere/libonnxruntime.so): this process has tract";
-        assert_eq!(error.to_string(), said);
+        let said = "backend ONNX Runtime (/nowhere/libonnxruntime.so): this process has tract";
+        assert!(error.to_string().ends_with(said), "{error}");
         assert_eq!(error, ClassifierError::Switch { chosen: Backend::Tract, asked });
     }
 
