@@ -50,7 +50,7 @@ pub enum MergeError {
         part: Partition,
     },
     /// Parts are missing.
-    #[error("failed to merge: {} of {count} missing: {}", if parts.len() == 1 { "a part" } else { "parts" }, parts.join(", "))]
+    #[error("failed to merge: {} of {count} parts {} missing: {}", parts.len(), if parts.len() == 1 { "is" } else { "are" }, parts.join(", "))]
     Missing {
         /// Number of parts of the campaign.
         count: u64,

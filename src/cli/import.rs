@@ -8,6 +8,7 @@ use closecall_traffic::atomic::write_file;
 
 use super::CliError;
 use super::help::{examples, heading};
+use super::new::scenario_file;
 use super::output::{command_line, print_written, textln};
 use super::protect::protect;
 use crate::exit_code::ExitCode;
@@ -25,7 +26,7 @@ pub(super) struct ImportArgs {
     #[arg(value_name = "FILE.xosc")]
     file: PathBuf,
     /// Scenario file to write
-    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", value_parser = scenario_file, help_heading = heading::OUTPUT)]
     output: PathBuf,
     /// Vehicle that the controller under test drives [default: `Ego`, or the only one with a
     /// controller]

@@ -56,7 +56,7 @@ pub(super) struct InitArgs {
 }
 
 /// Reads the name of a file that folders of scenarios find.
-fn scenario_file(text: &str) -> Result<PathBuf, String> {
+pub(super) fn scenario_file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     if path.extension().is_some_and(|end| end == "toml") {
         Ok(path)

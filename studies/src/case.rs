@@ -106,7 +106,7 @@ pub enum CausesError {
         controller: String,
     },
     /// No vehicle collides in the sample.
-    #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples are {failing}")]
+    #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples: {failing}")]
     Passes {
         /// The sample's number.
         sample: u64,

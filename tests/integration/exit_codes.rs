@@ -215,6 +215,7 @@ fn wrong_usage_ends_with_2() {
         vec!["run", headline, "--tracks", "tracks.csv"],
         vec!["run", headline, "--clusters", "clusters"],
         vec!["study", "perceive", "scans.parquet", "--tracks", "tracks.csv"],
+        vec!["tool", "import", "case.xosc", "--out", "scenario.txt"],
         vec!["run", headline, "--trace", "same.csv", "--record", "same.csv"],
         vec!["fly"],
     ] {

@@ -215,7 +215,7 @@ fn parts_of_weighted_runs_merge_to_the_bytes_of_one_machine() {
         assert_eq!(code(&output), 2, "{}", stderr(&output));
         message(&output)
     };
-    assert!(refused(&[first, third], "").contains("a part of 3 missing: 2/3"));
+    assert!(refused(&[first, third], "").contains("1 of 3 parts is missing: 2/3"));
     assert!(refused(&[first, second, second], "").contains("both hold part 2/3"));
     assert!(refused(&[first, second, &at("whole")], "").contains("holds a whole campaign"));
     assert!(refused(&[first, second, third], "--record worst:1").contains("cannot be merged with --record"));

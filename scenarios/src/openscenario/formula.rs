@@ -42,9 +42,9 @@ impl<'a> Values<'a> {
 
 /// Returns the message that there is no parameter of this name, with the names that there are.
 pub(super) fn no_parameter(name: &str, names: &BTreeSet<&str>) -> String {
-    let mut list: Vec<&str> = names.iter().copied().take(MOST_NAMES).collect();
+    let list: Vec<&str> = names.iter().copied().take(MOST_NAMES).collect();
     if list.is_empty() {
-        list.push("none");
+        return format!("there is no parameter `{name}`: the file has none");
     }
     let more = names.len().saturating_sub(MOST_NAMES);
     let more = if more > 0 { format!(" and {more} others") } else { String::new() };
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn a_message_lists_some_of_many_parameters() {
         let mut values = Values::default();
-        assert_eq!(values.unknown("a"), "there is no parameter `a`, only none");
+        assert_eq!(values.unknown("a"), "there is no parameter `a`: the file has none");
         for number in 0..100 {
             values.insert(format!("p{number:02}"), String::new());
         }
