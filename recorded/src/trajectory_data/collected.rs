@@ -22,6 +22,7 @@ use super::inferred_road::{InferredRoad, MIRRORED, Placed, Pose};
 use super::lane_sides::LaneSides;
 use super::markings::LaneMarkings;
 use super::plain::allowed;
+use super::plane_pieces::{PlaneMoment, PlanePieces};
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::stated_lanes::StatedLane;
@@ -87,6 +88,14 @@ pub(super) struct CollectedRow {
     pub(super) width_m: f64,
     pub(super) class: VehicleClass,
     pub(super) line: u64,
+}
+
+impl CollectedRow {
+    /// Returns the vehicle in the plane.
+    fn moment(&self, point: Point, heading_rad: f64) -> PlaneMoment {
+        let (vehicle, time, speed_mps) = (u64::from(self.vehicle), self.time, self.speed_mps);
+        PlaneMoment { vehicle, time, point, heading_rad, speed_mps }
+    }
 }
 
 /// The facts about a file that its reader has collected after the last row.
@@ -170,7 +179,9 @@ impl Collected {
         for indices in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
             let Some(&first) = indices.first() else { continue };
             let first_frame = steps(rows[first].time - start, period);
-            let mut direction = None;
+            let mut pieces = PlanePieces::default();
+            // The piece of the vehicle, and its direction of travel.
+            let mut direction: Option<(u64, usize)> = None;
             let mut before: Option<(Row, u32)> = None;
             let mut visits = 0;
             for &index in indices {
@@ -179,13 +190,11 @@ impl Collected {
                     Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road),
                     Position::Plane { point, heading_rad, named_lane, .. } => {
                         let inferred = road.as_ref();
-                        direction = direction.or_else(|| inferred.and_then(|road| road.direction(heading_rad)));
-                        (
-                            inferred
-                                .zip(direction)
-                                .and_then(|(road, direction)| road.place(direction, point, named_lane)),
-                            0,
-                        )
+                        let piece = pieces.number(row.moment(point, heading_rad));
+                        let chosen = || Some((piece, inferred?.direction(heading_rad)?));
+                        direction = direction.filter(|(before, _)| *before == piece).or_else(chosen);
+                        let place = inferred.zip(direction);
+                        (place.and_then(|(road, (_, direction))| road.place(direction, point, named_lane)), 0)
                     }
                 };
                 let Some(Placed { s_m, d_m, lane }) = place else { continue };
@@ -349,10 +358,11 @@ fn infer_road(
     }
     let infer = |changing: &BTreeSet<u64>| {
         let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
+            let mut pieces = PlanePieces::default();
             for &index in order {
                 let row = &rows[index];
                 if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
-                    let vehicle = u64::from(row.vehicle);
+                    let vehicle = pieces.number(row.moment(point, heading_rad));
                     let changes_lane = changes_lane || changing.contains(&vehicle);
                     visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
                 }

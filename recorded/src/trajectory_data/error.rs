@@ -483,6 +483,19 @@ pub enum TrajectoryFileProblem {
         /// What is compared.
         compared: &'static str,
     },
+    /// Lane changes on a derived road go to the other side than the file states.
+    #[error(
+        "in {contrary} of {all} lane changes, `latLaneCenterOffset` says left where the road that was derived from the traffic says \
+         right, or the reverse: the paths of {vehicles} vehicles do not show which way the lanes lie"
+    )]
+    LaneChangesToTheOtherSide {
+        /// Number of lane changes to the other side.
+        contrary: u64,
+        /// Number of lane changes that were compared.
+        all: u64,
+        /// Number of vehicles.
+        vehicles: usize,
+    },
     /// Vehicles drive against the road.
     #[error(
         "the position along the road falls in the direction of travel of {against} of {all} vehicles, such as vehicle {first}: \

@@ -51,12 +51,12 @@ impl<R: BufRead> TextSource<R> {
     }
 
     /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts,
-    /// it calls `meta` for the content of the metadata files. For exiD it also calls `infer_road`,
-    /// which derives the road from the traffic.
+    /// it calls `meta` for the content of the metadata files. For exiD it also calls `infer_road` with
+    /// the frame rate (Hz), which derives the road from the traffic.
     pub(super) fn with_meta(
         source: R,
         meta: impl FnOnce() -> Result<Meta, TrajectoryFileError>,
-        infer_road: impl FnOnce() -> Result<InferredRoad, TrajectoryFileError>,
+        infer_road: impl FnOnce(f64) -> Result<InferredRoad, TrajectoryFileError>,
     ) -> Result<Self, Result<ReadError, TrajectoryFileError>> {
         let (lines, number, first) = read_first_line(source).map_err(Ok)?;
         if !is_drone_header(&first) {

@@ -803,6 +803,75 @@ fn a_mirrored_data_set_of_exid_is_refused_and_the_named_options_mend_it() {
     assert!(read_with(folder.path(), ReadOptions { axes, ..ReadOptions::default() }).is_err());
 }
 
+/// Returns the lane changes of exiD's data set after `edit` of its rows: their fields in [`exid`]'s order.
+fn exid_changes(edit: impl Fn(Vec<Vec<String>>) -> Vec<Vec<String>>, separator: &str) -> Vec<(u64, Side)> {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &[], true);
+    let path = folder.path().join("05_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<String>>());
+    let header = lines.next().unwrap();
+    let rows = edit(lines.collect());
+    let rows = std::iter::once(&header).chain(&rows).map(|row| row.join(separator) + "\n");
+    std::fs::write(&path, rows.collect::<String>()).unwrap();
+    // Each vehicle has as many rows as its metadata states.
+    let meta = std::fs::read_to_string(folder.path().join("05_tracksMeta.csv")).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let rows_of = |vehicle: &str| text.lines().filter(|line| line.split(separator).nth(1) == Some(vehicle)).count();
+    let meta = meta.lines().map(|line| match line.split(',').nth(1).filter(|_| line.starts_with('5')) {
+        Some(vehicle) => format!("5,{vehicle},{},car\n", rows_of(vehicle)),
+        None => line.to_owned() + "\n",
+    });
+    std::fs::write(folder.path().join("05_tracksMeta.csv"), meta.collect::<String>()).unwrap();
+    let changes = detect(&smooth(&read(folder.path()).unwrap()));
+    changes.iter().map(|change| (change.track_id, change.direction)).collect()
+}
+
+#[test]
+fn a_data_set_of_exid_in_another_order_or_notation_has_the_same_lane_changes() {
+    let by_frame = |mut rows: Vec<Vec<String>>| {
+        rows.sort_by_key(|row| row[2].parse::<u32>().unwrap());
+        rows
+    };
+    let backwards = |mut rows: Vec<Vec<String>>| {
+        rows.reverse();
+        rows
+    };
+    let fractions = |mut rows: Vec<Vec<String>>| {
+        rows.iter_mut().for_each(|row| row[12] += ".0");
+        rows
+    };
+    let expected = [(2, Side::Left)];
+    assert_eq!(exid_changes(|rows| rows, ","), expected);
+    assert_eq!(exid_changes(by_frame, ","), expected);
+    assert_eq!(exid_changes(backwards, ","), expected);
+    assert_eq!(exid_changes(fractions, ","), expected);
+    assert_eq!(exid_changes(|rows| rows, "\t"), expected);
+}
+
+#[test]
+fn a_number_of_exid_that_is_used_again_is_not_the_path_of_a_road() {
+    // Vehicle 4 enters with the number of vehicle 3 after this has left.
+    let reused = |mut rows: Vec<Vec<String>>| {
+        for row in rows.iter_mut().filter(|row| row[1] == "4") {
+            row[1] = "3".to_owned();
+            row[2] = (row[2].parse::<u32>().unwrap() + 300).to_string();
+        }
+        rows
+    };
+    assert_eq!(exid_changes(reused, ","), [(2, Side::Left)]);
+}
+
+#[test]
+fn a_lanelet_that_is_no_number_is_refused_by_its_column() {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &[], true);
+    let path = folder.path().join("05_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace(",3.7,0,", ",3.7,right,").replace(",3.7,1,", ",3.7,left,")).unwrap();
+    assert_mentions(&read(folder.path()).unwrap_err(), &["column `laneletId`", "is `right`"], "names of lanelets");
+}
+
 #[test]
 fn urban_recordings_are_not_read_without_a_word() {
     let folder = tempfile::tempdir().unwrap();
