@@ -144,6 +144,15 @@ pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<Trajector
     Ok(data)
 }
 
+/// Warns if no lane change is found in `files`, so that nothing is judged. Returns whether that is so.
+pub(super) fn warn_without_lane_changes(files: &[PathBuf], lane_changes: usize) -> bool {
+    if lane_changes == 0 {
+        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        warn(format_args!("{}: no lane change is found, so that nothing can be judged", names.join(", ")));
+    }
+    lane_changes == 0
+}
+
 /// Names the option that takes no lane as recorded, if the recorded lanes are in doubt.
 pub(super) fn advise_on_lanes(are_in_doubt: bool) {
     if are_in_doubt {

@@ -48,9 +48,14 @@ pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
         warn("the recorded lanes are in doubt, so that the comparison says nothing");
         return Ok(ExitCode::Inconclusive);
     }
+    let is_in_doubt = data_sets.iter().any(|data| data.is_in_doubt);
     Ok(match (drift.is_tested, drift.has_drifted) {
         (_, true) => ExitCode::Fail,
-        (true, false) => ExitCode::Pass,
+        (true, false) if !is_in_doubt => ExitCode::Pass,
+        (true, false) => {
+            warn("a trajectory file is in doubt, so that a drift may be missed");
+            ExitCode::Inconclusive
+        }
         (false, false) => ExitCode::Inconclusive,
     })
 }

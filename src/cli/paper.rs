@@ -13,7 +13,7 @@ use closecall_report::traffic::statistics::RecordedChanges;
 use closecall_traffic::atomic::write_file;
 
 use super::CliError;
-use super::args::FilesArgs;
+use super::args::{FilesArgs, warn_without_lane_changes};
 use super::help::{examples, heading};
 use super::output::{during, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
@@ -53,6 +53,9 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
         .iter()
         .map(|data| RecordedChanges { name: data.name.clone(), changes: criticality(&smooth(data), &judgement) });
     let recorded: Vec<RecordedChanges> = recorded.collect();
+    let lane_changes = recorded.iter().map(|recording| recording.changes.len()).sum();
+    let has_none = warn_without_lane_changes(&args.data.files, lane_changes);
+    let is_in_doubt = has_none || data_sets.iter().any(|data| data.is_in_doubt);
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = match args.repetitions {
         0 => None,
@@ -67,5 +70,5 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     write_charts(&args.output, &paths, &charts)?;
     write_file(&index, |file| file.write_all(paper.page.as_bytes()))?;
     print_written(&index);
-    Ok(ExitCode::Pass)
+    Ok(if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass })
 }

@@ -12,7 +12,7 @@ use closecall_report::json::stamped;
 use closecall_report::traffic::statistics::{RecordedChanges, STATISTICS_CHARTS, StatisticsText, statistics_charts};
 
 use super::CliError;
-use super::args::{FilesArgs, Format};
+use super::args::{FilesArgs, Format, warn_without_lane_changes};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, write_charts};
 use super::protect::{of_trajectories, protect};
@@ -53,6 +53,8 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     let statistics = compute(
         &recordings.iter().flat_map(|recording| recording.changes.clone()).collect::<Vec<CriticalLaneChange>>(),
     );
+    let lane_changes = recordings.iter().map(|recording| recording.changes.len()).sum();
+    let is_in_doubt = is_in_doubt || warn_without_lane_changes(&args.data.files, lane_changes);
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &statistics_charts(&recordings)?)?;
     }

@@ -22,7 +22,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes};
+use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes, warn_without_lane_changes};
 use super::argument::Argument;
 use super::help::{examples, heading};
 use super::output::{command_line, during, outln, print_text, print_written, reading, warn, write_charts};
@@ -230,10 +230,13 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
         warn(format_args!("{}: {warning}", args.file.display()));
     }
     advise_on_lanes(basis.lacks_recorded_crossings() || tracks.doubts_lanes());
-    let nothing = basis.unexplained_crossings(changes.len());
-    if let Some(reason) = &nothing {
-        warn(format_args!("{}: {reason}", args.file.display()));
-    }
+    let has_none = match basis.unexplained_crossings(changes.len()) {
+        Some(reason) => {
+            warn(format_args!("{}: {reason}", args.file.display()));
+            true
+        }
+        None => warn_without_lane_changes(std::slice::from_ref(&args.file), changes.len()),
+    };
     let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
     if let Some(path) = &args.openlabel {
         reading(&args.file, || label_file(&args.file, args.read.options(), &Labels::LaneChanges(&changes), path))?;
@@ -246,7 +249,7 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
             "{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped\n{basis}\n{}{score}",
             LaneChangesText(&changes)
         ),
-        is_in_doubt: tracks.is_in_doubt() || nothing.is_some(),
+        is_in_doubt: tracks.is_in_doubt() || has_none,
     })
 }
 
@@ -270,6 +273,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     let speed_limit_mps = args.speed_limit_mps.map(|limit| limit.0);
     let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone, curvilinear: args.curvilinear };
     let changes = evaluate(smoothed, &judgement);
+    let has_none = warn_without_lane_changes(std::slice::from_ref(&args.file), changes.len());
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
         let chosen = by_severity(&changes, args.track);
@@ -293,7 +297,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     Ok(Answer {
         value: stamped(serde_json::json!(changes), None, None),
         text: CriticalityText { file: &file, changes: &changes, counted }.to_string(),
-        is_in_doubt: file.is_in_doubt,
+        is_in_doubt: file.is_in_doubt || has_none,
     })
 }
 

@@ -878,6 +878,9 @@ fn urban_recordings_are_not_read_without_a_word() {
     exid(folder.path(), &["latLaneCenterOffset", "laneWidth", "laneletId", "laneChange"], false);
     let data = read(folder.path()).unwrap();
     assert!(data.warnings()[0].contains("as in inD and rounD"), "{:?}", data.warnings());
+    // The longest path is the one of the vehicle that changes lanes, and four vehicles do not show that.
+    let few = "derived from the paths of 4 vehicles";
+    assert!(data.is_in_doubt && data.warnings().iter().any(|warning| warning.contains(few)), "{:?}", data.warnings());
 }
 
 #[test]
