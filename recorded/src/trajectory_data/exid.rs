@@ -174,7 +174,8 @@ impl Poses {
     fn of_row(&mut self, row: &PlaneRow) -> Pose {
         let PlaneRow { point, heading_rad, speed_mps, lane_width_m, offset_m, named_lane, .. } = *row;
         let time = Time::from_s(row.frame as f64 / self.frame_rate_hz);
-        let vehicle = self.pieces.number(PlaneMoment { vehicle: row.vehicle, time, point, heading_rad, speed_mps });
+        let (vehicle, clock) = (row.vehicle, Clock::Continuous);
+        let vehicle = self.pieces.number(PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock });
         // The flag alone is not enough: in some files it is 0 throughout. The offset from the
         // centre of the lane jumps where a vehicle enters the next lane.
         let before_m = self.latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
@@ -383,7 +384,8 @@ impl TextLayout for ExidColumns {
         let time = Time::from_s(frame as f64 / self.data.frame_rate_hz);
         let speed_mps = real(self.columns.speed, "lonVelocity", SPEED_MPS)?;
         // A vehicle keeps the direction of its first row, also on a curved ramp.
-        let piece = self.pieces.number(PlaneMoment { vehicle: track, time, point, heading_rad, speed_mps });
+        let clock = Clock::Continuous;
+        let piece = self.pieces.number(PlaneMoment { vehicle: track, time, point, heading_rad, speed_mps, clock });
         let latest_index = self.latest.filter(|(latest, _)| *latest == piece).map(|(_, index)| index);
         let index = latest_index.or_else(|| self.road.direction(heading_rad)).unwrap_or(0);
         self.latest = Some((piece, index));
@@ -398,7 +400,7 @@ impl TextLayout for ExidColumns {
             vehicle_id: track,
             frame,
             time,
-            clock: Clock::Continuous,
+            clock,
             s_m,
             d_m,
             lane,

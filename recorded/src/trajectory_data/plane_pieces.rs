@@ -14,6 +14,7 @@ use closecall_traffic::{Time, maths};
 use super::builder::PIECE_STRIDE;
 use super::continuity::{JUMP_ACROSS_M, JUMP_ACROSS_MPS, JUMP_ALONG_M, JUMP_ALONG_MPS, compared_until};
 use super::reference_line::Point;
+use super::source::Clock;
 
 /// Least movement across the heading as a share of the movement along it for a jump to the side (-), 27°:
 /// in a lane change it stays below 10°. Headings of some files have errors of a few degrees, which move a
@@ -28,6 +29,8 @@ pub(super) struct PlaneMoment {
     pub(super) point: Point,
     pub(super) heading_rad: f64,
     pub(super) speed_mps: f64,
+    /// In a simulation, a lane change may take a single step.
+    pub(super) clock: Clock,
 }
 
 /// Gives each piece of a vehicle a number of its own. The rows of a vehicle have to follow one another in
@@ -66,7 +69,7 @@ fn is_jump(before: &PlaneMoment, row: &PlaneMoment) -> bool {
     let across_m = (dy * cos - dx * sin) / norm;
     let excess_m = along_m - 0.5 * (before.speed_mps + row.speed_mps) * step_s;
     let exceeds = |off_m: f64, mps: f64, least_m: f64| !(off_m.abs() <= (mps * step_s).max(least_m));
-    let is_aside = across_m.abs() > LEAST_ASKEW * along_m.abs();
+    let is_aside = row.clock != Clock::Simulated && across_m.abs() > LEAST_ASKEW * along_m.abs();
     row.time > compared_until(before.time)
         || along_m < -JUMP_ALONG_M
         || exceeds(excess_m, JUMP_ALONG_MPS, JUMP_ALONG_M)
@@ -80,6 +83,10 @@ mod tests {
     /// Returns the pieces of a vehicle that drives at 20 m/s, at 10 Hz, and is elsewhere by these distances
     /// along and to the left of its road (m) from frame 50 on, after a pause (s).
     fn pieces(moved: (f64, f64), heading_rad: f64, pause_s: f64) -> usize {
+        pieces_by(Clock::Continuous, moved, heading_rad, pause_s)
+    }
+
+    fn pieces_by(clock: Clock, moved: (f64, f64), heading_rad: f64, pause_s: f64) -> usize {
         let mut numbers = PlanePieces::default();
         let (cos, sin) = (maths::cos(heading_rad), maths::sin(heading_rad));
         let number = |frame: u32| {
@@ -88,7 +95,8 @@ mod tests {
             let (shift_m, left_m) = if is_moved { moved } else { (0.0, 0.0) };
             let along_m = 20.0 * time_s + shift_m;
             let point = (along_m * cos - left_m * sin, along_m * sin + left_m * cos);
-            numbers.number(PlaneMoment { vehicle: 7, time: Time::from_s(time_s), point, heading_rad, speed_mps: 20.0 })
+            let (time, speed_mps) = (Time::from_s(time_s), 20.0);
+            numbers.number(PlaneMoment { vehicle: 7, time, point, heading_rad, speed_mps, clock })
         };
         let mut all: Vec<u64> = (0..100).map(number).collect();
         all.dedup();
@@ -104,6 +112,8 @@ mod tests {
             assert_eq!(pieces((1.0, 0.3), heading_rad, 0.0), 1, "an error of a position");
             assert_eq!(pieces((0.0, 3.5), heading_rad, 0.0), 2, "the vehicle beside it");
             assert_eq!(pieces((40.0, 0.0), heading_rad, 0.0), 2, "the vehicle ahead");
+            assert_eq!(pieces_by(Clock::Simulated, (0.0, 3.5), heading_rad, 0.0), 1, "a lane change of a single step");
+            assert_eq!(pieces_by(Clock::Simulated, (40.0, 0.0), heading_rad, 0.0), 2, "the vehicle ahead, simulated");
             assert_eq!(pieces((-200.0, 0.0), heading_rad, 2.0), 2, "a vehicle that enters");
             assert_eq!(pieces((0.0, 0.0), heading_rad, 60.0), 2, "long after");
         }
@@ -118,8 +128,9 @@ mod tests {
                 let time_s = period_s * f64::from(frame);
                 let angle = 0.2 * time_s;
                 let point = (100.0 * maths::sin(angle), 100.0 * (1.0 - maths::cos(angle)));
-                let (time, heading_rad) = (Time::from_s(time_s), angle);
-                assert_eq!(numbers.number(PlaneMoment { vehicle: 3, time, point, heading_rad, speed_mps: 20.0 }), 3);
+                let (time, heading_rad, clock) = (Time::from_s(time_s), angle, Clock::Continuous);
+                let moment = PlaneMoment { vehicle: 3, time, point, heading_rad, speed_mps: 20.0, clock };
+                assert_eq!(numbers.number(moment), 3);
             }
         }
     }

@@ -90,6 +90,37 @@ fn sumo_xml(jumps: bool) -> String {
     text + "</fcd-export>\n"
 }
 
+/// Two pairs of vehicles side by side. From 6 s on, the names of the first pair are exchanged if `are_exchanged`.
+fn side_by_side(are_exchanged: bool) -> String {
+    let mut text = "<fcd-export>\n".to_owned();
+    for time_s in times_s() {
+        writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
+        for (vehicle, lane, start_m) in [(0, 0, 0.0), (1, 1, 1.5), (2, 0, 60.0), (3, 1, 70.0)] {
+            let other = if are_exchanged && vehicle < 2 && time_s >= 6.0 { 1 - vehicle } else { vehicle };
+            let (front_m, y_m) = (start_m + 30.0 * time_s, SUMO_LANE_M * (f64::from(lane) - 2.5));
+            writeln!(
+                text,
+                "<vehicle id=\"{other}\" x=\"{front_m:.3}\" y=\"{y_m:.3}\" angle=\"90.00\" type=\"car\" speed=\"30.00\" \
+                 pos=\"{front_m:.2}\" lane=\"e0_{lane}\"/>"
+            )
+            .unwrap();
+        }
+        text += "</timestep>\n";
+    }
+    text + "</fcd-export>\n"
+}
+
+#[test]
+fn exchanged_numbers_of_a_simulation_are_no_lane_changes_of_a_single_step() {
+    let has_single_steps = |data: &TrajectoryData| data.notes.iter().any(|note| note.contains("a single step"));
+    for (are_exchanged, jumps) in [(false, 0), (true, 2)] {
+        let data = read_text(side_by_side(are_exchanged).as_bytes()).unwrap();
+        assert_eq!(data.continuity.jumps, jumps, "{:?}", data.notes);
+        assert!(detect(&smooth(&data)).is_empty() && !has_single_steps(&data), "{:?}", data.notes);
+    }
+    assert!(has_single_steps(&read_text(sumo_xml(true).as_bytes()).unwrap()));
+}
+
 fn sumo_table(separator: &str, has_prefix: bool) -> String {
     let name = |name: &&str| if has_prefix { format!("vehicle_{name}") } else { (*name).to_owned() };
     let mut header = vec![if has_prefix { "timestep_time".to_owned() } else { "time".to_owned() }];
