@@ -59,6 +59,11 @@ pub enum TrajectoryFileProblem {
     /// The file is text in another encoding.
     #[error("this is text in UTF-16, but UTF-8 is needed: save it again in that encoding (`iconv -f UTF-16 -t UTF-8`)")]
     Utf16,
+    /// The first line is text in an encoding of one byte for each letter.
+    #[error(
+        "this is text, but not in UTF-8, which is needed: save it again in that encoding (`iconv -f WINDOWS-1252 -t UTF-8`)"
+    )]
+    NotUtf8,
     /// A line is not valid UTF-8 text.
     #[error("the line is not text in UTF-8")]
     NotText,

@@ -566,6 +566,13 @@ fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
 }
 
 #[test]
+fn trajectories_of_i24_motion_against_their_direction_are_refused() {
+    let turned = i24(true).replace("\"direction\":1,", "\"direction\":-1,");
+    let error = read_text(turned.as_bytes()).unwrap_err();
+    assert_mentions(&error, &["falls in the direction of travel of 10 of 20 vehicles"], "direction");
+}
+
+#[test]
 fn a_number_of_i24_motion_that_is_given_to_another_vehicle_splits_its_track() {
     // From frame 100 on, the number belongs to a vehicle 3,000 ft ahead.
     let text = i24(true).lines().next().unwrap().trim_end_matches(',').to_owned() + "]";
