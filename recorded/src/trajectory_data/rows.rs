@@ -88,11 +88,13 @@ fn has_carriage_returns(line: &[u8]) -> bool {
     is_text && line.trim_ascii_end().contains(&b'\r')
 }
 
-/// Returns true if most of a line is printable ASCII, as of text in an encoding of one byte for each letter.
+/// Returns true if a line is text with separators in an encoding of one byte for each letter. The bytes 0xfe
+/// and 0xff are the marks of other encodings.
 fn is_latin(line: &[u8]) -> bool {
-    let is_control = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
+    let is_text = |byte: &u8| (!byte.is_ascii_control() || byte.is_ascii_whitespace()) && *byte < 0xfe;
+    let is_separator = |byte: &u8| matches!(byte, b',' | b';' | b'\t' | b' ');
     let other_letters = line.iter().filter(|byte| !byte.is_ascii()).count();
-    !line.iter().any(is_control) && 2 * other_letters < line.len()
+    line.iter().all(is_text) && line.iter().any(is_separator) && 2 * other_letters < line.len()
 }
 
 /// Returns true if a file begins like text in UTF-16: with its byte order mark, or with a letter and a
