@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::{Positive, recording as trajectory_path};
-use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
-use closecall_recorded::filters::smooth_file;
+use closecall_recorded::criticality::{Counted, CriticalLaneChange, Judgement, by_severity, criticality as evaluate};
+use closecall_recorded::filters::{SmoothedFile, smooth_file};
 use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
 use closecall_recorded::lane_change::{Criterion, FoundLaneChanges, find, listed_for, read_references, score};
 use closecall_recorded::openlabel::{Labels, label_file};
@@ -25,7 +25,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes, warn_without_lane_changes};
 use super::argument::Argument;
 use super::help::{examples, heading};
-use super::output::{command_line, during, outln, print_text, print_written, reading, warn, write_charts};
+use super::output::{command_line, during, out, outln, print_text, print_written, reading, warn, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
@@ -253,11 +253,43 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
     })
 }
 
-pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
-    Ok(print(args.format, &find_criticality(args)?))
+/// The lane changes of a file, judged.
+struct JudgedFile {
+    file: SmoothedFile,
+    changes: Vec<CriticalLaneChange>,
+    counted: Counted,
+    /// Whether a warning says why the result may be wrong.
+    is_in_doubt: bool,
 }
 
+pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
+    let JudgedFile { file, changes, counted, is_in_doubt } = judge_file(args)?;
+    match args.format {
+        // One value at a time: all of them together are larger than the tracks.
+        Format::Json => print_list(changes.iter().map(|change| stamped(serde_json::json!(change), None, None))),
+        Format::Human => print_text(CriticalityText { file: &file, changes: &changes, counted }),
+    }
+    Ok(if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass })
+}
+
+/// Returns the judged lane changes as a value for programs, without a text.
 pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliError> {
+    let JudgedFile { changes, is_in_doubt, .. } = judge_file(args)?;
+    let value = stamped(serde_json::json!(changes), None, None);
+    Ok(Answer { value, text: String::new(), is_in_doubt })
+}
+
+/// Prints a list of values, as the list of all would be printed.
+fn print_list(values: impl Iterator<Item = Value>) {
+    let mut before = "[";
+    for value in values {
+        out!("{before}\n  {}", format!("{value:#}").replace('\n', "\n  "));
+        before = ",";
+    }
+    outln!("{}", if before == "[" { "[]" } else { "\n]" });
+}
+
+fn judge_file(args: &CriticalityArgs) -> Result<JudgedFile, CliError> {
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
     protect(&inputs, &[("--record", args.record.as_deref()), ("--openlabel", args.openlabel.as_deref())])?;
     let charts = args.plot.as_ref().map(|folder| CRITICALITY_CHARTS.map(|name| folder.join(name)));
@@ -294,11 +326,8 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &criticality_charts(&changes, speed_limit_mps)?)?;
     }
-    Ok(Answer {
-        value: stamped(serde_json::json!(changes), None, None),
-        text: CriticalityText { file: &file, changes: &changes, counted }.to_string(),
-        is_in_doubt: file.is_in_doubt || has_none,
-    })
+    let is_in_doubt = file.is_in_doubt || has_none;
+    Ok(JudgedFile { file, changes, counted, is_in_doubt })
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
