@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::{Positive, recording as trajectory_path};
 use closecall_recorded::criticality::{Counted, CriticalLaneChange, Judgement, by_severity, criticality as evaluate};
 use closecall_recorded::filters::{SmoothedFile, smooth_file};
-use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
+use closecall_recorded::fit::{Heading, correlated_in_files, to_toml, write_toml};
 use closecall_recorded::lane_change::{Criterion, FoundLaneChanges, find, listed_for, read_references, score};
 use closecall_recorded::openlabel::{Labels, label_file};
 use closecall_recorded::trajectory_data::{Layout, open};
@@ -22,7 +22,9 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes, warn_without_lane_changes};
+use super::args::{
+    FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes, smooth_noting, warn_without_lane_changes,
+};
 use super::argument::Argument;
 use super::help::{examples, heading};
 use super::output::{command_line, during, out, outln, print_text, print_written, reading, warn, write_charts};
@@ -338,9 +340,11 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 
 pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
-    let data_sets = args.data.read_all()?;
-    let fit = if args.correlations { correlated } else { fit_distributions };
-    let fitted = during("fitting distributions".to_owned(), || fit(&data_sets, args.seed));
+    let files = smooth_noting(&args.data)?;
+    let mut fitted = during("fitting distributions".to_owned(), || correlated_in_files(&files, args.seed));
+    if !args.correlations {
+        fitted.correlations.clear();
+    }
     if fitted.fitted.is_empty() {
         if let Format::Json = args.format {
             outln!("{:#}", stamped(json::fitted(&fitted), None, None));
@@ -361,6 +365,6 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
             None => to_toml(&fitted, &heading),
             Some(_) => FitText(&fitted).to_string(),
         },
-        is_in_doubt: data_sets.iter().any(|data| data.is_in_doubt),
+        is_in_doubt: files.iter().any(|file| file.is_in_doubt),
     })
 }
