@@ -371,10 +371,20 @@ fn infer_road(
     let infer = |changing: &BTreeSet<u64>| {
         let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
             let mut pieces = PlanePieces::default();
+            let mut before: Option<(u32, Option<StatedLane>)> = None;
             for &index in order {
                 let row = &rows[index];
                 if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
                     let vehicle = pieces.number(row.moment((point, heading_rad), clock));
+                    let last_lane = before.filter(|(vehicle, _)| *vehicle == row.vehicle).and_then(|(_, lane)| lane);
+                    before = Some((row.vehicle, named_lane));
+                    // A file in another order than that of time cannot say who changes lanes, row by row.
+                    let changes_lane = match named_lane {
+                        Some(StatedLane { edge, index: Some(index) }) => {
+                            last_lane.is_some_and(|last| last.edge == edge && last.index != Some(index))
+                        }
+                        _ => changes_lane,
+                    };
                     let changes_lane = changes_lane || changing.contains(&vehicle);
                     visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
                 }

@@ -111,6 +111,18 @@ fn side_by_side(are_exchanged: bool) -> String {
 }
 
 #[test]
+fn a_table_of_floating_car_data_in_another_order_has_the_same_lane_change() {
+    let text = sumo_table(";", true);
+    let (header, rows) = text.split_once('\n').unwrap();
+    let backwards: Vec<&str> = rows.lines().rev().collect();
+    let data = read_text(format!("{header}\n{}\n", backwards.join("\n")).as_bytes()).unwrap();
+    assert!(!data.is_in_doubt, "{:?}", data.notes);
+    // The names are no numbers: vehicles are numbered in the order of their first rows.
+    let changes = detect(&smooth(&data));
+    assert_eq!(changes.iter().map(|change| (change.track_id, change.direction)).collect::<Vec<_>>(), [(3, Side::Left)]);
+}
+
+#[test]
 fn exchanged_numbers_of_a_simulation_are_no_lane_changes_of_a_single_step() {
     let has_single_steps = |data: &TrajectoryData| data.notes.iter().any(|note| note.contains("a single step"));
     for (are_exchanged, jumps) in [(false, 0), (true, 2)] {
