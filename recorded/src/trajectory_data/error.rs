@@ -64,6 +64,9 @@ pub enum TrajectoryFileProblem {
         "this is text, but not in UTF-8, which is needed: save it again in that encoding (`iconv -f WINDOWS-1252 -t UTF-8`)"
     )]
     NotUtf8,
+    /// A line repeats the header.
+    #[error("the header stands here again: several files were joined, and each has to be read by itself")]
+    RepeatedHeader,
     /// A line is not valid UTF-8 text.
     #[error("the line is not text in UTF-8")]
     NotText,
@@ -625,6 +628,7 @@ impl TrajectoryFileProblem {
                 | Self::CutLine
                 | Self::OtherCount { .. }
                 | Self::NotText
+                | Self::RepeatedHeader
         )
     }
 
@@ -643,6 +647,7 @@ impl TrajectoryFileProblem {
             Self::ColumnCount { .. } | Self::CutLine => "cut rows",
             Self::OpenQuote | Self::NotText => "rows that are not text",
             Self::Value { .. }
+            | Self::RepeatedHeader
             | Self::DecimalComma { .. }
             | Self::NegativeSpeed { .. }
             | Self::HeadingUnit { .. }

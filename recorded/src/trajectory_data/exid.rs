@@ -311,7 +311,7 @@ fn visit_rows(
         match lines.next() {
             Ok(Some((number, line))) => {
                 let Some((separator, needed, indices)) = &columns else {
-                    let at_header = |problem| ReadError::new(number, problem);
+                    let at_header = |problem: TrajectoryFileProblem| ReadError::new(number, problem);
                     let (header, separator, width) = Header::parse(line).map_err(at_header)?;
                     let indices = ColumnIndices::new(&header).map_err(at_header)?;
                     columns = Some((separator, width, indices));
