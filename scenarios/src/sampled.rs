@@ -20,9 +20,8 @@
 //!
 //! Vehicles behind the vehicle that changes lanes, in its lane or in its target lane, are left out.
 //! They do not influence it, and with their recorded motion they would drive into it when it keeps
-//! a longer distance than recorded. A vehicle whose record ends keeps its last speed. A vehicle that
-//! overlaps with another one until the end of the lane change is left out, too: in its record, or
-//! after the end of it.
+//! a longer distance than recorded. A vehicle whose record overlaps with another one is left out,
+//! too. A vehicle whose record ends keeps its last speed.
 //!
 //! Each step can be *transferred* to the margin increase system: the vehicle that changes lanes
 //! becomes the rear vehicle, the vehicle that it overtakes becomes the ego, and the next one ahead
@@ -63,12 +62,6 @@ const PATH_STEP_M: f64 = 2.0;
 /// Time in which a vehicle steers straight ahead after the end of its record (s): an assumption, 1 to 3
 /// are plausible.
 const STRAIGHTENING_S: f64 = 2.0;
-/// Step at which vehicles are compared after the end of a record.
-const EXTENSION_STEP: Time = Time::from_ms(100);
-/// Distances that two vehicles keep along and across the road after the end of a record (m): a path leaves
-/// out the noise of positions. Assumptions, 0.2 to 1 and 0.1 to 0.3 are plausible.
-const SPARE_ALONG_M: f64 = 0.5;
-const SPARE_ACROSS_M: f64 = 0.2;
 /// Distance to the edge of the road that the path of a vehicle's centre keeps (m): numerical.
 const EDGE_M: f64 = 0.01;
 /// Largest acceleration with which a vehicle starts (m/s²): dry friction. Beyond it lies noise.
@@ -182,6 +175,11 @@ impl SampledEncounter {
     }
 }
 
+/// Returns the name of the actor that drives as a track does and is no opponent.
+pub fn name_of_other(track_id: u64) -> String {
+    format!("track-{track_id}")
+}
+
 /// Returns the index of the vehicle that has overtaken the lane changer, in the list of vehicles of
 /// the encounter: the next vehicle ahead in the target lane at the recorded crossing, if it is
 /// there from the start.
@@ -212,14 +210,8 @@ fn simulated_others(encounter: &RecordedEncounter, opp2: Option<usize>) -> Vec<u
     let is_opponent = |index: &usize| Some(*index) == opp1 || Some(*index) == opp2;
     let mut kept = vec![encounter.rear_index()];
     kept.extend((0..encounter.vehicles.len()).filter(is_opponent));
-    let until = encounter.time_of(encounter.change.end_s).min(encounter.end);
     for (index, vehicle) in encounter.vehicles.iter().enumerate() {
-        let is_apart = |other: &usize| {
-            let pair = [&encounter.vehicles[*other].trajectory, &vehicle.trajectory];
-            // The driver of the vehicle that changes lanes is another one than the recorded one.
-            let is_driven = *other == encounter.rear_index();
-            stays_apart(pair) && (is_driven || keeps_apart_after_the_record(pair, until))
-        };
+        let is_apart = |other: &usize| stays_apart(&encounter.vehicles[*other].trajectory, &vehicle.trajectory);
         let is_new = !kept.contains(&index) && start_of(&vehicle.trajectory).is_some();
         if is_new && !is_behind(encounter, vehicle) && kept.iter().all(is_apart) {
             kept.push(index);
@@ -244,7 +236,7 @@ fn built(
         let name = match Some(index) {
             index if index == opp1 => OPP1.to_owned(),
             index if index == opp2 => OPP2.to_owned(),
-            _ => format!("track-{}", vehicle.trajectory.track_id),
+            _ => name_of_other(vehicle.trajectory.track_id),
         };
         // The lateral path holds the lane changes.
         let speeds = match prescribed_driver(encounter, vehicle) {
@@ -344,7 +336,7 @@ fn path_in_steps(encounter: &RecordedEncounter, vehicle: &Trajectory, step_s: f6
 }
 
 /// Returns whether two recorded vehicles never overlap, and keep a gap at the start.
-fn stays_apart([one, other]: [&Trajectory; 2]) -> bool {
+fn stays_apart(one: &Trajectory, other: &Trajectory) -> bool {
     let touching_m = touching_distance_m(one.dimensions.length_m, other.dimensions.length_m);
     let beside_m = touching_distance_m(one.dimensions.width_m, other.dimensions.width_m);
     one.points.iter().all(|point| {
@@ -354,34 +346,6 @@ fn stays_apart([one, other]: [&Trajectory; 2]) -> bool {
         };
         other.at(point.time).is_none_or(apart)
     })
-}
-
-/// Returns whether two vehicles do not overlap from the end of the first of their records to `until`.
-fn keeps_apart_after_the_record([one, other]: [&Trajectory; 2], until: Time) -> bool {
-    let touching_m = touching_distance_m(one.dimensions.length_m, other.dimensions.length_m) + SPARE_ALONG_M;
-    let beside_m = touching_distance_m(one.dimensions.width_m, other.dimensions.width_m) + SPARE_ACROSS_M;
-    let ends = [one, other].map(|vehicle| vehicle.points.last().map(|point| point.time));
-    let [Some(one_end), Some(other_end)] = ends else { return true };
-    let times = std::iter::successors(Some(one_end.min(other_end)), |time| Some(*time + EXTENSION_STEP));
-    times.skip(1).take_while(|time| *time <= until).all(|time| {
-        let positions = position_at(one, time).zip(position_at(other, time));
-        positions.is_none_or(|([one_m, one_left_m], [other_m, other_left_m])| {
-            (other_m - one_m).abs() > touching_m || (other_left_m - one_left_m).abs() > beside_m
-        })
-    })
-}
-
-/// Returns the position of a vehicle along and across the road (m). After the end of its record it keeps
-/// its last speed, and steers straight ahead, as its path does.
-fn position_at(vehicle: &Trajectory, time: Time) -> Option<[f64; 2]> {
-    if let Some(point) = vehicle.at(time) {
-        return Some([point.s_m, point.d_m]);
-    }
-    let end = vehicle.points.last().filter(|end| end.time < time)?;
-    let since_s = (time - end.time).s();
-    let steered_s = since_s.min(STRAIGHTENING_S);
-    let across_m = end.lateral_speed_mps * steered_s * (1.0 - 0.5 * steered_s / STRAIGHTENING_S);
-    Some([end.s_m + end.speed_mps * since_s, end.d_m + across_m])
 }
 
 /// Returns the ego, which is behind all other vehicles and as slow as the slowest of them.

