@@ -13,9 +13,8 @@
 
 use std::path::Path;
 
-use closecall_recorded::filters::smooth;
+use closecall_recorded::filters::SmoothedFile;
 use closecall_recorded::fit::{MIN_VALUES, Quantity, Samples, observe};
-use closecall_recorded::trajectory_data::TrajectoryData;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
 use closecall_scenarios::{ScenarioError, source};
 use closecall_traffic::Stream;
@@ -177,11 +176,11 @@ pub struct Drift {
     pub has_drifted: bool,
 }
 
-/// Compares trajectory data with fitted distributions. `seed` determines the simulated distances.
-pub fn drift(fitted: &Fitted, data_sets: &[TrajectoryData], seed: u64) -> Drift {
+/// Compares trajectory files with fitted distributions. `seed` determines the simulated distances.
+pub fn drift(fitted: &Fitted, files: &[SmoothedFile], seed: u64) -> Drift {
     let mut samples = Samples::default();
-    for data in data_sets {
-        samples.extend(observe(&smooth(data)));
+    for file in files {
+        samples.extend(observe(&file.data));
     }
     let p_value = |name: &str, summary: &Summary, new: &[f64]| {
         two_sample::p_value(summary.distance(new), &summary.simulated(new.len(), &mut stream(seed, name)))

@@ -75,7 +75,7 @@ pub use intervention::{FaultConfig, IdealConfig, Interventions, MisState};
 pub use logical::{Spreads, logical};
 pub use reenacted::{RearDriver, actor_name, reenact};
 pub use run_key::RunKey;
-pub use sampled::{SampledEncounter, opp2_of, sampled};
+pub use sampled::{SampledEncounter, name_of_other, opp2_of, sampled};
 pub use schema::strict_schema;
 pub use step_value::{StepValue, Variation};
 pub use traffic::{ClassWeightsConfig, TrafficConfig};

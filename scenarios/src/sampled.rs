@@ -175,6 +175,11 @@ impl SampledEncounter {
     }
 }
 
+/// Returns the name of the actor that drives as a track does and is no opponent.
+pub fn name_of_other(track_id: u64) -> String {
+    format!("track-{track_id}")
+}
+
 /// Returns the index of the vehicle that has overtaken the lane changer, in the list of vehicles of
 /// the encounter: the next vehicle ahead in the target lane at the recorded crossing, if it is
 /// there from the start.
@@ -231,7 +236,7 @@ fn built(
         let name = match Some(index) {
             index if index == opp1 => OPP1.to_owned(),
             index if index == opp2 => OPP2.to_owned(),
-            _ => format!("track-{}", vehicle.trajectory.track_id),
+            _ => name_of_other(vehicle.trajectory.track_id),
         };
         // The lateral path holds the lane changes.
         let speeds = match prescribed_driver(encounter, vehicle) {

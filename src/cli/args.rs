@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::error::ErrorKind;
 use clap::{ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 use closecall_campaign::arguments::parsed_list;
+use closecall_recorded::filters::{SmoothedFile, smooth_file};
 use closecall_recorded::lane_change::LaneReliability;
 use closecall_recorded::trajectory_data::{
     AxisOptions, BadRows, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError, read_with, refuse_duplicates,
@@ -142,6 +143,34 @@ pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<Trajector
     }
     advise_on_lanes(data.doubts_lanes);
     Ok(data)
+}
+
+/// Reads and smooths trajectory files, each without its recorded tracks, and prints the remarks that a reader
+/// of the results needs.
+///
+/// # Errors
+/// A file cannot be read, its content is wrong, or it was read before.
+pub(super) fn smooth_noting(data: &FilesArgs) -> Result<Vec<SmoothedFile>, CliError> {
+    let mut read = ReadFiles::default();
+    let smoothed = data.files.iter().map(|path| {
+        let file = reading(path, || smooth_file(path, data.read.options()))?;
+        for warning in &file.warnings {
+            warn(format_args!("{}: {warning}", path.display()));
+        }
+        advise_on_lanes(file.doubts_lanes);
+        read.note(path, &file.hash)?;
+        Ok::<SmoothedFile, CliError>(file)
+    });
+    smoothed.collect()
+}
+
+/// Warns if no lane change is found in `files`, so that nothing is judged. Returns whether that is so.
+pub(super) fn warn_without_lane_changes(files: &[PathBuf], lane_changes: usize) -> bool {
+    if lane_changes == 0 {
+        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        warn(format_args!("{}: no lane change is found, so that nothing can be judged", names.join(", ")));
+    }
+    lane_changes == 0
 }
 
 /// Names the option that takes no lane as recorded, if the recorded lanes are in doubt.

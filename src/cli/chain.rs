@@ -28,9 +28,8 @@ use closecall_campaign::summary::Summary;
 use closecall_campaign::workers::Workers;
 use closecall_recorded::criticality::{Judgement, criticality};
 use closecall_recorded::encounter::{Approach, Relevant, Variation, approach, most_relevant};
-use closecall_recorded::filters::{SmoothedTrajectoryData, smooth};
+use closecall_recorded::filters::{SmoothedFile, SmoothedTrajectoryData};
 use closecall_recorded::fit::{Quantity, Samples, observe};
-use closecall_recorded::trajectory_data::{TrajectoryData, count_flaws};
 use closecall_report::campaign::origins::{Origin, OriginFile, Origins, OriginsText};
 use closecall_report::run::figure::still;
 use closecall_report::run::film::{Part, film_lane_change};
@@ -44,7 +43,7 @@ use closecall_traffic::words::counted;
 use serde_json::{Value, json};
 
 use super::CliError;
-use super::args::{FilesArgs, Format, SensorsChoice};
+use super::args::{FilesArgs, Format, SensorsChoice, smooth_noting};
 use super::arms::ControllerArgs;
 use super::campaign::{Companion, Planned, carry_out};
 use super::ending::EndArgs;
@@ -145,9 +144,9 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
         tested => vec![ControllerChoice::ACC, tested],
     };
     let gates = args.gates.or_measure()?.gates(true, Design::Random, None)?;
-    let data_sets = args.data.read_all()?;
+    let smoothed = smooth_noting(&args.data)?;
     let recordings: Vec<Recording> =
-        args.data.files.iter().zip(data_sets).map(|(path, data)| Recording::new(path, data)).collect();
+        args.data.files.iter().zip(smoothed).map(|(path, file)| Recording::new(path, file)).collect();
     let mut chain = Chain::new(recordings, usize::from(args.encounters), &args.out)?;
     if chain.encounters.is_empty() {
         print_error(format_args!("{}", chain.nothing_found()));
@@ -179,9 +178,8 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
 }
 
 impl Recording {
-    fn new(path: &Path, data: TrajectoryData) -> Self {
-        let counts = count_flaws(&data);
-        let smoothed = smooth(&data);
+    fn new(path: &Path, file: SmoothedFile) -> Self {
+        let SmoothedFile { data: smoothed, flaws: counts, hash, .. } = file;
         let changes = criticality(&smoothed, &Judgement::default());
         let (mut approaches, mut refused) = (Vec::new(), BTreeMap::new());
         for change in &changes {
@@ -203,7 +201,7 @@ impl Recording {
         let flaws = flaws.into_iter().filter(|(_, count)| *count > 0);
         let origin = OriginFile {
             path: path.display().to_string(),
-            blake3: data.hash.clone(),
+            blake3: hash,
             tracks: counts.tracks,
             flaws: flaws.map(|(name, count)| (name.to_owned(), count)).collect(),
             lane_changes: changes.len(),

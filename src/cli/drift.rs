@@ -8,7 +8,7 @@ use closecall_report::json::stamped;
 use closecall_report::traffic::drift::DriftText;
 
 use super::CliError;
-use super::args::{FilesArgs, Format};
+use super::args::{FilesArgs, Format, smooth_noting};
 use super::help::{examples, heading};
 use super::output::{during, outln, print_text, warn};
 use crate::exit_code::ExitCode;
@@ -37,9 +37,9 @@ pub(super) struct DriftArgs {
 
 pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
     let fitted = Fitted::read(&args.fitted)?;
-    let data_sets = args.data.read_all()?;
-    let are_lanes_in_doubt = data_sets.iter().any(|data| data.doubts_lanes);
-    let drift = during("comparing distributions".to_owned(), || compare(&fitted, &data_sets, args.seed));
+    let files = smooth_noting(&args.data)?;
+    let are_lanes_in_doubt = files.iter().any(|file| file.doubts_lanes);
+    let drift = during("comparing distributions".to_owned(), || compare(&fitted, &files, args.seed));
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(drift), None, None)),
         Format::Human => print_text(DriftText(&drift)),
@@ -48,9 +48,14 @@ pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
         warn("the recorded lanes are in doubt, so that the comparison says nothing");
         return Ok(ExitCode::Inconclusive);
     }
+    let is_in_doubt = files.iter().any(|file| file.is_in_doubt);
     Ok(match (drift.is_tested, drift.has_drifted) {
         (_, true) => ExitCode::Fail,
-        (true, false) => ExitCode::Pass,
+        (true, false) if !is_in_doubt => ExitCode::Pass,
+        (true, false) => {
+            warn("a trajectory file is in doubt, so that a drift may be missed");
+            ExitCode::Inconclusive
+        }
         (false, false) => ExitCode::Inconclusive,
     })
 }

@@ -6,14 +6,13 @@ use clap::Args;
 use closecall_campaign::arguments::positive;
 use closecall_campaign::robustness::robustness;
 use closecall_recorded::criticality::{Judgement, criticality};
-use closecall_recorded::filters::smooth;
 use closecall_recorded::robustness::Setup;
 use closecall_report::traffic::paper::Paper;
 use closecall_report::traffic::statistics::RecordedChanges;
 use closecall_traffic::atomic::write_file;
 
 use super::CliError;
-use super::args::FilesArgs;
+use super::args::{FilesArgs, smooth_noting, warn_without_lane_changes};
 use super::help::{examples, heading};
 use super::output::{during, print_written, write_charts};
 use super::protect::{must_be_folder, of_trajectories, protect};
@@ -48,12 +47,15 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let index = args.output.join("index.html");
     protect(&of_trajectories(&args.data.files), &[("--out", Some(&index))])?;
     must_be_folder(Some(&args.output))?;
-    let data_sets = args.data.read_all()?;
+    let files = smooth_noting(&args.data)?;
+    let is_in_doubt = files.iter().any(|file| file.is_in_doubt);
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ..Judgement::default() };
-    let recorded = data_sets
-        .iter()
-        .map(|data| RecordedChanges { name: data.name.clone(), changes: criticality(&smooth(data), &judgement) });
+    let recorded = files
+        .into_iter()
+        .map(|file| RecordedChanges { changes: criticality(&file.data, &judgement), name: file.data.name });
     let recorded: Vec<RecordedChanges> = recorded.collect();
+    let lane_changes = recorded.iter().map(|recording| recording.changes.len()).sum();
+    let is_in_doubt = is_in_doubt || warn_without_lane_changes(&args.data.files, lane_changes);
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = match args.repetitions {
         0 => None,
@@ -68,5 +70,5 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     write_charts(&args.output, &paths, &charts)?;
     write_file(&index, |file| file.write_all(paper.page.as_bytes()))?;
     print_written(&index);
-    Ok(ExitCode::Pass)
+    Ok(if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass })
 }

@@ -94,9 +94,10 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
                 CliError::NotReproduced { file: args.file.display().to_string(), source: not_reproduced }
             }
         })?;
-        Ok((encounter, source, zero))
+        Ok((source, zero))
     };
-    let (encounter, source, zero) = chosen_by(&args.file, &args.read, wanted, zero_of)??;
+    let (source, zero) = chosen_by(&args.file, &args.read, wanted, zero_of)??;
+    let encounter = zero.encounter.clone();
     let inputs = (Path::new(&source), &args.set.settings[..]);
     let last_key = key.rsplit('.').next().unwrap_or_default();
     // Only a parameter of the vehicle that changes lanes is calibrated.

@@ -6,13 +6,12 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::arguments::positive;
 use closecall_recorded::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
-use closecall_recorded::filters::smooth;
-use closecall_recorded::trajectory_data::TrajectoryData;
+use closecall_recorded::filters::SmoothedFile;
 use closecall_report::json::stamped;
 use closecall_report::traffic::statistics::{RecordedChanges, STATISTICS_CHARTS, StatisticsText, statistics_charts};
 
 use super::CliError;
-use super::args::{FilesArgs, Format};
+use super::args::{FilesArgs, Format, smooth_noting, warn_without_lane_changes};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, write_charts};
 use super::protect::{must_be_folder, of_trajectories, protect};
@@ -45,15 +44,17 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     must_be_folder(args.plot.as_deref())?;
-    let data_sets = args.data.read_all()?;
-    let is_in_doubt = data_sets.iter().any(|data| data.is_in_doubt);
+    let files = smooth_noting(&args.data)?;
+    let is_in_doubt = files.iter().any(|file| file.is_in_doubt);
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ..Judgement::default() };
     let changes =
-        |data: TrajectoryData| RecordedChanges { changes: criticality(&smooth(&data), &judgement), name: data.name };
-    let recordings: Vec<RecordedChanges> = data_sets.into_iter().map(changes).collect();
+        |file: SmoothedFile| RecordedChanges { changes: criticality(&file.data, &judgement), name: file.data.name };
+    let recordings: Vec<RecordedChanges> = files.into_iter().map(changes).collect();
     let statistics = compute(
         &recordings.iter().flat_map(|recording| recording.changes.clone()).collect::<Vec<CriticalLaneChange>>(),
     );
+    let lane_changes = recordings.iter().map(|recording| recording.changes.len()).sum();
+    let is_in_doubt = is_in_doubt || warn_without_lane_changes(&args.data.files, lane_changes);
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &statistics_charts(&recordings)?)?;
     }

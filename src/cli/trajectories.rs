@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::{Positive, recording as trajectory_path};
-use closecall_recorded::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
-use closecall_recorded::filters::smooth_file;
-use closecall_recorded::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
+use closecall_recorded::criticality::{Counted, CriticalLaneChange, Judgement, by_severity, criticality as evaluate};
+use closecall_recorded::filters::{SmoothedFile, smooth_file};
+use closecall_recorded::fit::{Heading, correlated_in_files, to_toml, write_toml};
 use closecall_recorded::lane_change::{Criterion, FoundLaneChanges, find, listed_for, read_references, score};
 use closecall_recorded::openlabel::{Labels, label_file};
 use closecall_recorded::trajectory_data::{Layout, open};
@@ -22,10 +22,12 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes};
+use super::args::{
+    FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes, smooth_noting, warn_without_lane_changes,
+};
 use super::argument::Argument;
 use super::help::{examples, heading};
-use super::output::{command_line, during, outln, print_text, print_written, reading, warn, write_charts};
+use super::output::{command_line, during, out, outln, print_text, print_written, reading, warn, write_charts};
 use super::protect::{must_be_folder, must_be_writable, of_trajectories, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
@@ -231,10 +233,13 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
         warn(format_args!("{}: {warning}", args.file.display()));
     }
     advise_on_lanes(basis.lacks_recorded_crossings() || tracks.doubts_lanes());
-    let nothing = basis.unexplained_crossings(changes.len());
-    if let Some(reason) = &nothing {
-        warn(format_args!("{}: {reason}", args.file.display()));
-    }
+    let has_none = match basis.unexplained_crossings(changes.len()) {
+        Some(reason) => {
+            warn(format_args!("{}: {reason}", args.file.display()));
+            true
+        }
+        None => warn_without_lane_changes(std::slice::from_ref(&args.file), changes.len()),
+    };
     let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
     if let Some(path) = &args.openlabel {
         reading(&args.file, || label_file(&args.file, args.read.options(), &Labels::LaneChanges(&changes), path))?;
@@ -247,15 +252,47 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
             "{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped\n{basis}\n{}{score}",
             LaneChangesText(&changes)
         ),
-        is_in_doubt: tracks.is_in_doubt() || nothing.is_some(),
+        is_in_doubt: tracks.is_in_doubt() || has_none,
     })
 }
 
-pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
-    Ok(print(args.format, &find_criticality(args)?))
+/// The lane changes of a file, judged.
+struct JudgedFile {
+    file: SmoothedFile,
+    changes: Vec<CriticalLaneChange>,
+    counted: Counted,
+    /// Whether a warning says why the result may be wrong.
+    is_in_doubt: bool,
 }
 
+pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
+    let JudgedFile { file, changes, counted, is_in_doubt } = judge_file(args)?;
+    match args.format {
+        // One value at a time: all of them together are larger than the tracks.
+        Format::Json => print_list(changes.iter().map(|change| stamped(serde_json::json!(change), None, None))),
+        Format::Human => print_text(CriticalityText { file: &file, changes: &changes, counted }),
+    }
+    Ok(if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass })
+}
+
+/// Returns the judged lane changes as a value for programs, without a text.
 pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliError> {
+    let JudgedFile { changes, is_in_doubt, .. } = judge_file(args)?;
+    let value = stamped(serde_json::json!(changes), None, None);
+    Ok(Answer { value, text: String::new(), is_in_doubt })
+}
+
+/// Prints a list of values, as the list of all would be printed.
+fn print_list(values: impl Iterator<Item = Value>) {
+    let mut before = "[";
+    for value in values {
+        out!("{before}\n  {}", format!("{value:#}").replace('\n', "\n  "));
+        before = ",";
+    }
+    outln!("{}", if before == "[" { "[]" } else { "\n]" });
+}
+
+fn judge_file(args: &CriticalityArgs) -> Result<JudgedFile, CliError> {
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
     protect(&inputs, &[("--record", args.record.as_deref()), ("--openlabel", args.openlabel.as_deref())])?;
     let charts = args.plot.as_ref().map(|folder| CRITICALITY_CHARTS.map(|name| folder.join(name)));
@@ -273,6 +310,7 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     let speed_limit_mps = args.speed_limit_mps.map(|limit| limit.0);
     let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone, curvilinear: args.curvilinear };
     let changes = evaluate(smoothed, &judgement);
+    let has_none = warn_without_lane_changes(std::slice::from_ref(&args.file), changes.len());
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
         let chosen = by_severity(&changes, args.track);
@@ -293,11 +331,8 @@ pub(super) fn find_criticality(args: &CriticalityArgs) -> Result<Answer, CliErro
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &criticality_charts(&changes, speed_limit_mps)?)?;
     }
-    Ok(Answer {
-        value: stamped(serde_json::json!(changes), None, None),
-        text: CriticalityText { file: &file, changes: &changes, counted }.to_string(),
-        is_in_doubt: file.is_in_doubt,
-    })
+    let is_in_doubt = file.is_in_doubt || has_none;
+    Ok(JudgedFile { file, changes, counted, is_in_doubt })
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
@@ -309,9 +344,11 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     must_be_writable(args.output.as_deref())?;
-    let data_sets = args.data.read_all()?;
-    let fit = if args.correlations { correlated } else { fit_distributions };
-    let fitted = during("fitting distributions".to_owned(), || fit(&data_sets, args.seed));
+    let files = smooth_noting(&args.data)?;
+    let mut fitted = during("fitting distributions".to_owned(), || correlated_in_files(&files, args.seed));
+    if !args.correlations {
+        fitted.correlations.clear();
+    }
     if fitted.fitted.is_empty() {
         if let Format::Json = args.format {
             outln!("{:#}", stamped(json::fitted(&fitted), None, None));
@@ -332,6 +369,6 @@ pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
             None => to_toml(&fitted, &heading),
             Some(_) => FitText(&fitted).to_string(),
         },
-        is_in_doubt: data_sets.iter().any(|data| data.is_in_doubt),
+        is_in_doubt: files.iter().any(|file| file.is_in_doubt),
     })
 }

@@ -303,6 +303,15 @@ fn a_file_without_lane_changes_is_no_wrong_command_line_and_no_success() {
     let output = closecall(["traffic", "fit", straight, "-o", fitted.to_str().unwrap()]);
     stdout(&output, INCONCLUSIVE);
     assert!(stderr(&output).contains("enough values") && !fitted.exists(), "{}", stderr(&output));
+    let pictures = folder.path().join("paper");
+    let paper = ["paper", straight, "--repetitions", "0", "-o", pictures.to_str().unwrap()];
+    let none = ["lane-changes", straight, "--lanes", "none"];
+    let commands = ["lane-changes", "criticality", "statistics"].map(|command| [command, straight]);
+    for words in commands.iter().map(|words| &words[..]).chain([&paper[..], &none]) {
+        let output = closecall(["traffic"].iter().chain(words));
+        stdout(&output, INCONCLUSIVE);
+        assert!(stderr(&output).contains("straight.csv: no lane change is found"), "{words:?}: {}", stderr(&output));
+    }
     // Another track does change lanes: the command line is wrong.
     let changing = three_vehicles(&folder.path().join("changing.csv"), Some(5.0));
     stdout(&closecall(["traffic", "reenact", changing.to_str().unwrap(), "--track", "2"]), 2);

@@ -281,12 +281,31 @@ fn a_lane_change_that_no_driver_reproduces_is_refused_with_the_error() {
 }
 
 #[test]
+fn vehicles_that_would_collide_after_the_end_of_their_records_do_not_end_the_run() {
+    let folder = folder();
+    let changer = |time_s: f64| [22.0 * time_s, changing(time_s, 9.0, 0.0)];
+    // Both are recorded for 2 s; at its last speed, the rear one would reach the front one at 4.2 s.
+    let rear = |time_s: f64| [60.0 + 26.0 * time_s, 0.5 * LANE_M];
+    let front = |time_s: f64| [90.0 + 20.0 * time_s, 0.5 * LANE_M];
+    let file = recording(folder.path(), &[(1, [0.0, 20.0], &changer), (3, [0.0, 2.0], &rear), (4, [0.0, 2.0], &front)]);
+    let out = folder.path().join("out");
+    let sampled = json(&sample(&file, "1", &["--from", "1.5", "-o", out.to_str().unwrap()]), 0);
+    assert!(sampled["runs"][1]["crossing_s"].as_f64().unwrap() > 9.0, "{sampled}");
+    let step = fs::read_to_string(out.join("step-0.toml")).unwrap();
+    assert_ne!(step.contains("\"track-3\""), step.contains("\"track-4\""), "{step}");
+}
+
+#[test]
 fn a_short_record_before_the_lane_change_is_refused_and_a_second_lane_change_is_sampled() {
     let folder = folder();
     let short = |time_s: f64| [22.0 * time_s, changing(time_s, 9.0, 0.0)];
-    let file = recording(folder.path(), &[(1, [9.6, 20.0], &short)]);
+    let file = recording(folder.path(), &[(1, [10.0, 20.0], &short)]);
     let message = message(&sample(&file, "1", &[]));
-    assert!(message.contains("before it crosses the marking; 2.0 s are needed"), "{message}");
+    assert!(message.contains("before it crosses the marking; 2.0 s are needed, or a record that begins"), "{message}");
+    // A quick lane change that is recorded from its start on, 1.8 s before the crossing.
+    let quick = |time_s: f64| [22.0 * time_s, changing(9.0 + (time_s - 9.0) * 4.0 / 2.6, 9.0, 0.0)];
+    let file = recording(folder.path(), &[(1, [8.5, 20.0], &quick)]);
+    assert!(json(&sample(&file, "1", &[]), 0)["runs"][1]["crossing_s"].is_f64());
     // Two lane changes, the second one directly after the first one.
     let twice = |time_s: f64| [22.0 * time_s, changing(time_s, 6.0, 0.0) + changing(time_s, 10.5, 0.0) - 0.5 * LANE_M];
     let file = recording(folder.path(), &[(1, [0.0, 20.0], &twice)]);

@@ -137,7 +137,9 @@ impl<'a> Roles<'a> {
         let since = |track: &Trajectory| track.span().map_or(self.change_start, |(first, _)| first);
         let earliest = since(self.rear).max(self.change_start - LEAD_IN);
         let start = self.ego.map_or(earliest, |ego| since(ego).max(earliest));
-        if crossing < start + SHORTEST_APPROACH {
+        // A record that holds the lane change from its start on is long enough.
+        let holds_start = start <= Time::from_s(change.start_s);
+        if !holds_start && crossing < start + SHORTEST_APPROACH {
             return Err(NoEncounter::TooShort {
                 track_id: self.rear.track_id,
                 ego_id: self.ego.filter(|ego| since(ego) > earliest).map(|ego| ego.track_id),

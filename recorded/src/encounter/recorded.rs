@@ -8,7 +8,8 @@ pub const LEAD_IN: Time = Time::from_ms(20_000);
 /// Part of an encounter after the lane change ends.
 pub const LEAD_OUT: Time = Time::from_ms(6_000);
 /// Shortest time from the start of an encounter to the crossing: a shorter approach is not
-/// informative.
+/// informative. If no lead vehicle is required, a lane change that is recorded from its start on
+/// needs no longer approach.
 pub const SHORTEST_APPROACH: Time = Time::from_ms(2_000);
 /// Distance to the ego vehicle along the road below which another vehicle belongs to the encounter
 /// (m).
@@ -157,9 +158,10 @@ pub enum NoEncounter {
     },
     /// The vehicles with roles are not recorded together for long enough before the crossing.
     #[error(
-        "track {track_id}{}{} is recorded for {recorded_s:.1} s before it crosses the marking; {needed_s:.1} s are needed",
+        "track {track_id}{}{} is recorded for {recorded_s:.1} s before it crosses the marking; {needed_s:.1} s are needed{}",
         ego_id.map_or(String::new(), |ego_id| format!(" behind track {ego_id}")),
-        front_id.map_or(String::new(), |front_id| format!(" behind track {front_id}"))
+        front_id.map_or(String::new(), |front_id| format!(" behind track {front_id}")),
+        front_id.map_or(", or a record that begins before the lane change does", |_| "")
     )]
     TooShort {
         /// Track id of the rear vehicle.

@@ -28,6 +28,8 @@ pub struct SmoothedFile {
     pub doubts_lanes: bool,
     /// What a reader of results has to know of the file.
     pub warnings: Vec<String>,
+    /// BLAKE3 hash of the file content in hexadecimal digits.
+    pub hash: String,
 }
 
 /// Smooths the tracks of the file at `path`, and holds no more of its rows than needed.
@@ -46,7 +48,8 @@ pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, Tr
     let data = read_with(path, options)?;
     let (flaws, warnings) = (count_flaws(&data), data.warnings());
     let (is_in_doubt, doubts_lanes) = (data.is_in_doubt, data.doubts_lanes);
-    Ok(SmoothedFile { data: smooth(&data), flaws, period: data.period, is_in_doubt, doubts_lanes, warnings })
+    let (period, hash) = (data.period, data.hash.clone());
+    Ok(SmoothedFile { data: smooth(&data), flaws, period, is_in_doubt, doubts_lanes, warnings, hash })
 }
 
 /// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
@@ -71,5 +74,6 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
     let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
     let (flaws, period, is_in_doubt) = (inspector.count_flaws(), file.period(), file.is_in_doubt());
-    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes: file.doubts_lanes(), warnings }))
+    let (doubts_lanes, hash) = (file.doubts_lanes(), file.hash());
+    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes, warnings, hash }))
 }

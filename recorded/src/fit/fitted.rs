@@ -2,7 +2,7 @@
 
 use super::correlation::{RankCorrelation, correlations};
 use super::{FittedQuantity, Quantity, Samples, observe};
-use crate::filters::smooth;
+use crate::filters::{SmoothedFile, smooth};
 use crate::trajectory_data::TrajectoryData;
 
 /// The fitted distributions of all quantities, over all trajectory data sets.
@@ -31,6 +31,21 @@ pub fn correlated(data_sets: &[TrajectoryData], seed: u64) -> FittedDistribution
     for data in data_sets {
         samples.extend(observe(&smooth(data)));
     }
+    fit_samples(&samples, data_sets.iter().map(|data| (data.name.clone(), data.hash.clone())).collect(), seed)
+}
+
+/// Fits the distributions, and the rank correlations between the quantities, like [`correlated`], to files
+/// whose tracks are smoothed already.
+pub fn correlated_in_files(files: &[SmoothedFile], seed: u64) -> FittedDistributions {
+    let mut samples = Samples::default();
+    for file in files {
+        samples.extend(observe(&file.data));
+    }
+    fit_samples(&samples, files.iter().map(|file| (file.data.name.clone(), file.hash.clone())).collect(), seed)
+}
+
+/// Fits the distributions of samples of data sets with these names and hashes.
+fn fit_samples(samples: &Samples, data_sets: Vec<(String, String)>, seed: u64) -> FittedDistributions {
     let (mut fitted, mut too_few) = (Vec::new(), Vec::new());
     for quantity in Quantity::ALL {
         let values = samples.values(quantity);
@@ -39,7 +54,6 @@ pub fn correlated(data_sets: &[TrajectoryData], seed: u64) -> FittedDistribution
             None => too_few.push((quantity, values.len())),
         }
     }
-    let data_sets = data_sets.iter().map(|data| (data.name.clone(), data.hash.clone())).collect();
-    let correlations = correlations(&samples);
+    let correlations = correlations(samples);
     FittedDistributions { data_sets, seed, fitted, too_few, correlations }
 }

@@ -14,7 +14,7 @@ use closecall_traffic::{Time, VehicleClass, maths};
 
 use super::builder::PIECE_STRIDE;
 use super::class_names::{UnknownClass, UnknownClasses};
-use super::continuity::{JUMP_ALONG_MPS, LONGEST_BRIDGE};
+use super::continuity::{JUMP_ACROSS_M, JUMP_ALONG_M, JUMP_ALONG_MPS, LONGEST_BRIDGE};
 use super::data::MarkingDistances;
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
@@ -22,6 +22,7 @@ use super::inferred_road::{InferredRoad, MIRRORED, Placed, Pose};
 use super::lane_sides::LaneSides;
 use super::markings::LaneMarkings;
 use super::plain::allowed;
+use super::plane_pieces::{PlaneMoment, PlanePieces};
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::stated_lanes::StatedLane;
@@ -56,8 +57,8 @@ const LEAST_STEPS: usize = 50;
 /// Cosine of the largest angle between a heading and the movement, 30° (-).
 const MOST_TURNED: f64 = 0.866;
 
-/// Number of lane changes by jumps that may have another cause.
-const FEW_JUMPS: u64 = 0;
+/// Number of lane changes within a single step that may have another cause.
+const FEW_JUMPS: usize = 0;
 
 /// A position, as the layout states it.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +88,14 @@ pub(super) struct CollectedRow {
     pub(super) width_m: f64,
     pub(super) class: VehicleClass,
     pub(super) line: u64,
+}
+
+impl CollectedRow {
+    /// Returns the vehicle in the plane.
+    fn moment(&self, (point, heading_rad): (Point, f64), clock: Clock) -> PlaneMoment {
+        let (vehicle, time, speed_mps) = (u64::from(self.vehicle), self.time, self.speed_mps);
+        PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock }
+    }
 }
 
 /// The facts about a file that its reader has collected after the last row.
@@ -157,20 +166,25 @@ impl Collected {
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by_key(|&index| (rows[index].vehicle, rows[index].time, rows[index].line));
         let period = period(&rows, &order);
-        let road = infer_road(&rows, &order, facts.lane_width_m).map_err(|error| match error.problem {
-            TrajectoryFileProblem::NoRoad { .. } => against_headings(&rows, &order).map_or(error, ReadError::of_file),
-            _ => error,
-        })?;
+        let road =
+            infer_road((&rows, &order), facts.lane_width_m, facts.clock).map_err(|error| match error.problem {
+                TrajectoryFileProblem::NoRoad { .. } => {
+                    against_headings(&rows, &order).map_or(error, ReadError::of_file)
+                }
+                _ => error,
+            })?;
         notes.extend(road.iter().flat_map(InferredRoad::warnings));
         let is_in_doubt = road.as_ref().is_some_and(InferredRoad::is_in_doubt);
         let is_mirrored = road.as_ref().is_some_and(InferredRoad::is_mirrored);
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
-        let mut jumps = 0;
+        let mut jumps: Vec<LaneJump> = Vec::new();
         for indices in order.chunk_by(|&a, &b| rows[a].vehicle == rows[b].vehicle) {
             let Some(&first) = indices.first() else { continue };
             let first_frame = steps(rows[first].time - start, period);
-            let mut direction = None;
+            let mut pieces = PlanePieces::default();
+            // The piece of the vehicle, and its direction of travel.
+            let mut direction: Option<(u64, usize)> = None;
             let mut before: Option<(Row, u32)> = None;
             let mut visits = 0;
             for &index in indices {
@@ -179,13 +193,11 @@ impl Collected {
                     Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road),
                     Position::Plane { point, heading_rad, named_lane, .. } => {
                         let inferred = road.as_ref();
-                        direction = direction.or_else(|| inferred.and_then(|road| road.direction(heading_rad)));
-                        (
-                            inferred
-                                .zip(direction)
-                                .and_then(|(road, direction)| road.place(direction, point, named_lane)),
-                            0,
-                        )
+                        let piece = pieces.number(row.moment((point, heading_rad), facts.clock));
+                        let chosen = || Some((piece, inferred?.direction(heading_rad)?));
+                        direction = direction.filter(|(before, _)| *before == piece).or_else(chosen);
+                        let place = inferred.zip(direction);
+                        (place.and_then(|(road, (_, direction))| road.place(direction, point, named_lane)), 0)
                     }
                 };
                 let Some(Placed { s_m, d_m, lane }) = place else { continue };
@@ -216,14 +228,23 @@ impl Collected {
                     marking_distances: MarkingDistances::default(),
                     line: row.line,
                 };
-                jumps += u64::from(before.as_ref().is_some_and(|(last, _)| is_lane_jump(last, &row)));
+                if let Some((last, _)) = before.filter(|(last, _)| is_lane_jump(last, &row)) {
+                    jumps.push(LaneJump { index, road: road_index, before: last, row });
+                }
                 before = Some((row, road_index));
                 placed[index] = Some(row);
             }
         }
-        if facts.clock == Clock::Simulated && jumps > FEW_JUMPS {
+        let exchanged = exchanges(&mut jumps);
+        let exchanged_rows = exchanged.len();
+        for index in exchanged {
+            // A recording has no lane changes of a single step, so that this one splits the track.
+            placed[index] = placed[index].map(|row| Row { clock: Clock::Continuous, ..row });
+        }
+        let single_steps = jumps.len() - exchanged_rows;
+        if facts.clock == Clock::Simulated && single_steps > FEW_JUMPS {
             notes.push(format!(
-                "{jumps} lane changes take a single step, because the simulation does not model their movement: their times, lanes and \
+                "{single_steps} lane changes take a single step, because the simulation does not model their movement: their times, lanes and \
                  distances hold, their durations, lateral speeds and lateral accelerations mean nothing"
             ));
         }
@@ -340,19 +361,30 @@ fn against_headings(rows: &[CollectedRow], order: &[usize]) -> Option<Trajectory
 /// If no row says who changes lanes, the vehicle whose path is the reference line may do so. Most
 /// vehicles then seem to move to the other side, and another path becomes the reference line.
 fn infer_road(
-    rows: &[CollectedRow],
-    order: &[usize],
+    (rows, order): (&[CollectedRow], &[usize]),
     lane_width_m: Option<f64>,
+    clock: Clock,
 ) -> Result<Option<InferredRoad>, ReadError> {
     if !rows.iter().any(|row| matches!(row.position, Position::Plane { .. })) {
         return Ok(None);
     }
     let infer = |changing: &BTreeSet<u64>| {
         let road = InferredRoad::of(|visit: &mut dyn FnMut(Pose)| {
+            let mut pieces = PlanePieces::default();
+            let mut before: Option<(u32, Option<StatedLane>)> = None;
             for &index in order {
                 let row = &rows[index];
                 if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
-                    let vehicle = u64::from(row.vehicle);
+                    let vehicle = pieces.number(row.moment((point, heading_rad), clock));
+                    let last_lane = before.filter(|(vehicle, _)| *vehicle == row.vehicle).and_then(|(_, lane)| lane);
+                    before = Some((row.vehicle, named_lane));
+                    // A file in another order than that of time cannot say who changes lanes, row by row.
+                    let changes_lane = match named_lane {
+                        Some(StatedLane { edge, index: Some(index) }) => {
+                            last_lane.is_some_and(|last| last.edge == edge && last.index != Some(index))
+                        }
+                        _ => changes_lane,
+                    };
                     let changes_lane = changes_lane || changing.contains(&vehicle);
                     visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
                 }
@@ -401,6 +433,42 @@ fn changing_references(road: &InferredRoad, rows: &[CollectedRow], order: &[usiz
         road.reference(direction).filter(|_| *usual_m > LANE_CHANGE_M)
     });
     changing.collect()
+}
+
+/// A change of the lane within a single step.
+#[derive(Clone, Copy, Debug)]
+struct LaneJump {
+    /// Index of the later row.
+    index: usize,
+    road: u32,
+    before: Row,
+    row: Row,
+}
+
+impl LaneJump {
+    /// Returns true if the vehicle takes the place of the vehicle of `other`, as that drives on.
+    fn takes_place_of(&self, other: &Self) -> bool {
+        let step_s = (other.row.time - other.before.time).s();
+        let along_m = self.row.s_m - other.before.s_m - other.before.speed_mps * step_s;
+        let across_m = self.row.d_m - other.before.d_m;
+        along_m.abs() <= JUMP_ALONG_M && across_m.abs() <= JUMP_ACROSS_M
+    }
+}
+
+/// Sorts the jumps by time, and returns the indices of the rows of those in which two vehicles beside each
+/// other exchange their places: their numbers were exchanged, and no vehicle changes lanes.
+fn exchanges(jumps: &mut [LaneJump]) -> Vec<usize> {
+    jumps.sort_by_key(|jump| (jump.road, jump.row.time, jump.index));
+    let mut exchanged = Vec::new();
+    for at_once in jumps.chunk_by(|a, b| (a.road, a.row.time) == (b.road, b.row.time)) {
+        for (k, jump) in at_once.iter().enumerate() {
+            let is_mutual = |other: &LaneJump| jump.takes_place_of(other) && other.takes_place_of(jump);
+            if at_once.iter().enumerate().any(|(other_k, other)| other_k != k && is_mutual(other)) {
+                exchanged.push(jump.index);
+            }
+        }
+    }
+    exchanged
 }
 
 fn is_lane_jump(before: &Row, row: &Row) -> bool {

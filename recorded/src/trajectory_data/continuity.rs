@@ -41,16 +41,16 @@ const LEAST_CUT: u64 = 3;
 pub(super) const JUMP_ALONG_MPS: f64 = 30.0;
 /// Smallest jump along the road (m): less than the length of a car, so that two cars in one lane
 /// are further apart.
-const JUMP_ALONG_M: f64 = 3.5;
+pub(super) const JUMP_ALONG_M: f64 = 3.5;
 /// Lateral speed of a jump (m/s). Lane changes take 6.28 s with a standard deviation of 2.0 s
 /// (E. Olsen et al., "Analysis of Distribution, Frequency, and Duration of Naturalistic Lane
 /// Changes", HFES 2002). On a quintic path over 3.75 m, a lane change that is shorter by two standard
 /// deviations reaches 3.1 m/s for an instant. In the longest step that is bridged at 10 Hz, 0.6 s, the
 /// limit is 1.8 m: less than the distance of two vehicles side by side.
-const JUMP_ACROSS_MPS: f64 = 3.0;
+pub(super) const JUMP_ACROSS_MPS: f64 = 3.0;
 /// Smallest jump across the road (m): half a narrow lane, so that two vehicles side by side are
 /// further apart. Errors of positions stay below it.
-const JUMP_ACROSS_M: f64 = 1.5;
+pub(super) const JUMP_ACROSS_M: f64 = 1.5;
 
 /// The steps of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

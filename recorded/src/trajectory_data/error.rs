@@ -59,6 +59,14 @@ pub enum TrajectoryFileProblem {
     /// The file is text in another encoding.
     #[error("this is text in UTF-16, but UTF-8 is needed: save it again in that encoding (`iconv -f UTF-16 -t UTF-8`)")]
     Utf16,
+    /// The first line is text in an encoding of one byte for each letter.
+    #[error(
+        "this is text, but not in UTF-8, which is needed: save it again in that encoding (`iconv -f WINDOWS-1252 -t UTF-8`)"
+    )]
+    NotUtf8,
+    /// A line repeats the header.
+    #[error("the header stands here again: several files were joined, and each has to be read by itself")]
+    RepeatedHeader,
     /// A line is not valid UTF-8 text.
     #[error("the line is not text in UTF-8")]
     NotText,
@@ -483,6 +491,19 @@ pub enum TrajectoryFileProblem {
         /// What is compared.
         compared: &'static str,
     },
+    /// Lane changes on a derived road go to the other side than the file states.
+    #[error(
+        "in {contrary} of {all} lane changes, `latLaneCenterOffset` says left where the road that was derived from the traffic says \
+         right, or the reverse: the paths of {vehicles} vehicles do not show which way the lanes lie"
+    )]
+    LaneChangesToTheOtherSide {
+        /// Number of lane changes to the other side.
+        contrary: u64,
+        /// Number of lane changes that were compared.
+        all: u64,
+        /// Number of vehicles.
+        vehicles: usize,
+    },
     /// Vehicles drive against the road.
     #[error(
         "the position along the road falls in the direction of travel of {against} of {all} vehicles, such as vehicle {first}: \
@@ -607,6 +628,7 @@ impl TrajectoryFileProblem {
                 | Self::CutLine
                 | Self::OtherCount { .. }
                 | Self::NotText
+                | Self::RepeatedHeader
         )
     }
 
@@ -625,6 +647,7 @@ impl TrajectoryFileProblem {
             Self::ColumnCount { .. } | Self::CutLine => "cut rows",
             Self::OpenQuote | Self::NotText => "rows that are not text",
             Self::Value { .. }
+            | Self::RepeatedHeader
             | Self::DecimalComma { .. }
             | Self::NegativeSpeed { .. }
             | Self::HeadingUnit { .. }

@@ -11,7 +11,7 @@
 //!
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
 //! another format. The reader therefore infers the road from the traffic before it reads the rows;
-//! see `inferred_road`. Lanelets that follow one another are one lane; see `stated_lanes`. A vehicle
+//! see `inferred_road`. It sorts rows in another order than that of the data set first. Lanelets that follow one another are one lane; see `stated_lanes`. A vehicle
 //! changes its lane where `laneChange` is 1, or where its offset from the lane's centre jumps. The
 //! offset also shows whether the positions are mirrored; see `orientation`.
 //!
@@ -19,7 +19,7 @@
 //! intersections and roundabouts, where vehicles do not follow lanes. The reader gives a warning, and
 //! refuses a file in which most vehicles follow no road.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 use std::path::Path;
 
@@ -36,8 +36,10 @@ use super::highd::{SPEED_MPS, check_row_counts};
 use super::inferred_road::{InferredRoad, Placed, Pose};
 use super::input::{Digest, open_file, with_path};
 use super::markings::DEFAULT_LANE_WIDTH_M;
+use super::order::WINDOW_ROWS;
 use super::orientation::{LaneOffset, OffsetSides};
 use super::plain::allowed;
+use super::plane_pieces::{PlaneMoment, PlanePieces};
 use super::reference_line::Point;
 use super::rows::{Fields, Lines, Separator};
 use super::source::{Clock, FileInfo, ReadError, Row};
@@ -46,6 +48,9 @@ use super::text_layout::TextLayout;
 
 const HEADING_DEG: Bounds = Bounds::closed(-360.0, 720.0);
 const LANE_WIDTH_M: Bounds = Bounds::closed(2.0, 6.0);
+/// Numbers of lanelets, and the number that means no lanelet.
+const LANELETS: (i64, i64) = (-allowed::IDS.1, allowed::IDS.1);
+const NO_LANELET: i64 = -1;
 
 /// Step of the offset from the lane's centre that shows a change of lane, as a share of the lane
 /// width (-): the offset jumps by a whole lane width, and within a lane it is continuous.
@@ -92,10 +97,35 @@ impl ColumnIndices {
         })
     }
 
-    /// Returns the lanelet that a row names.
-    fn named_lane(&self, line: &str, fields: &Fields) -> Option<StatedLane> {
-        let lanelet = first_of(fields.get(line, self.lanelet?)).parse().ok()?;
-        Some(StatedLane { edge: lanelet, index: None })
+    /// Returns the lanelet that a row names; `None` if its field is empty or -1.
+    fn named_lane(&self, line: &str, fields: &Fields) -> Result<Option<StatedLane>, FieldError> {
+        let text = self.lanelet.map_or("", |index| first_of(fields.get(line, index)));
+        if text.is_empty() {
+            return Ok(None);
+        }
+        let lanelet = integer(text, "laneletId", LANELETS)?;
+        // Maps of the format may have negative numbers.
+        let edge = u64::from_ne_bytes(lanelet.to_ne_bytes());
+        Ok((lanelet != NO_LANELET).then_some(StatedLane { edge, index: None }))
+    }
+
+    /// Returns what a row shows of the road.
+    fn plane_row(&self, line: &str, fields: &Fields) -> Result<PlaneRow, FieldError> {
+        let (vehicle, point, heading_rad) = self.pose(line, fields)?;
+        let field = |column: Option<usize>| first_of(column.map_or("", |index| fields.get(line, index)));
+        let flag = field(self.lane_change);
+        let is_one = || integer(flag, "laneChange", (0, 1)).is_ok_and(|flag| flag == 1);
+        Ok(PlaneRow {
+            vehicle,
+            frame: integer(fields.get(line, self.frame), "frame", allowed::FRAMES)?,
+            point,
+            heading_rad,
+            speed_mps: number(fields.get(line, self.speed), "lonVelocity", SPEED_MPS)?,
+            lane_width_m: number(field(self.lane_width), "laneWidth", LANE_WIDTH_M).ok(),
+            offset_m: self.offset_m(line, fields),
+            is_flagged: flag.eq_ignore_ascii_case("true") || is_one(),
+            named_lane: self.named_lane(line, fields)?,
+        })
     }
 
     /// Returns the offset of a vehicle from the centre of its lane (m).
@@ -113,6 +143,49 @@ impl ColumnIndices {
     }
 }
 
+/// What a row shows of the road.
+#[derive(Clone, Copy, Debug)]
+struct PlaneRow {
+    vehicle: u64,
+    frame: i64,
+    point: Point,
+    heading_rad: f64,
+    speed_mps: f64,
+    lane_width_m: Option<f64>,
+    offset_m: Option<f64>,
+    /// `true` if `laneChange` says that the vehicle leaves its lane.
+    is_flagged: bool,
+    named_lane: Option<StatedLane>,
+}
+
+/// Turns rows into poses. The rows of a vehicle have to follow one another.
+struct Poses {
+    frame_rate_hz: f64,
+    pieces: PlanePieces,
+    /// The piece of a vehicle in the row before, and its offset from the centre of its lane (m).
+    latest: Option<(u64, f64)>,
+}
+
+impl Poses {
+    fn new(frame_rate_hz: f64) -> Self {
+        Self { frame_rate_hz, pieces: PlanePieces::default(), latest: None }
+    }
+
+    fn of_row(&mut self, row: &PlaneRow) -> Pose {
+        let PlaneRow { point, heading_rad, speed_mps, lane_width_m, offset_m, named_lane, .. } = *row;
+        let time = Time::from_s(row.frame as f64 / self.frame_rate_hz);
+        let (vehicle, clock) = (row.vehicle, Clock::Continuous);
+        let vehicle = self.pieces.number(PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock });
+        // The flag alone is not enough: in some files it is 0 throughout. The offset from the
+        // centre of the lane jumps where a vehicle enters the next lane.
+        let before_m = self.latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
+        let least_m = OFFSET_JUMP_SHARE * lane_width_m.unwrap_or(DEFAULT_LANE_WIDTH_M);
+        let jumps = before_m.zip(offset_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() > least_m);
+        self.latest = offset_m.map(|offset_m| (vehicle, offset_m));
+        Pose { vehicle, point, heading_rad, lane_width_m, changes_lane: jumps || row.is_flagged, named_lane }
+    }
+}
+
 /// Reads the rows of `NN_tracks.csv`.
 pub(super) struct ExidColumns {
     columns: ColumnIndices,
@@ -121,7 +194,8 @@ pub(super) struct ExidColumns {
     meta_file: String,
     unknown_classes: UnknownClasses,
     road: InferredRoad,
-    /// The vehicle of the previous row and the index of its direction.
+    pieces: PlanePieces,
+    /// The piece of a vehicle in the previous row, and the index of its direction.
     latest: Option<(u64, usize)>,
     sides: OffsetSides,
 }
@@ -139,6 +213,7 @@ impl ExidColumns {
             vehicles,
             meta_file: file,
             road,
+            pieces: PlanePieces::default(),
             latest: None,
             sides: OffsetSides::default(),
             unknown_classes,
@@ -150,27 +225,61 @@ impl ExidColumns {
 /// reading of the rows reports them.
 ///
 /// # Errors
-/// Fails if the file cannot be read, no vehicle moves, or the vehicles do not follow a road.
-pub(super) fn road_from_traffic(path: &Path) -> Result<InferredRoad, TrajectoryFileError> {
-    let road = InferredRoad::of(|visit| {
-        let mut latest: Option<(u64, f64)> = None;
-        each_row(path, |columns, line, fields| {
-            let Ok((vehicle, point, heading_rad)) = columns.pose(line, fields) else { return };
-            let field = |column: Option<usize>| first_of(column.map_or("", |index| fields.get(line, index)));
-            let lane_width_m = number(field(columns.lane_width), "laneWidth", LANE_WIDTH_M).ok();
-            let offset_m = columns.offset_m(line, fields);
-            // The flag alone is not enough: in some files it is 0 throughout. The offset from the
-            // centre of the lane jumps where a vehicle enters the next lane.
-            let before_m = latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
-            let least_m = OFFSET_JUMP_SHARE * lane_width_m.unwrap_or(DEFAULT_LANE_WIDTH_M);
-            let jumps = before_m.zip(offset_m).is_some_and(|(before_m, now_m)| (now_m - before_m).abs() > least_m);
-            latest = offset_m.map(|offset_m| (vehicle, offset_m));
-            let changes_lane = jumps || field(columns.lane_change) == "1";
-            let named_lane = columns.named_lane(line, fields);
-            visit(Pose { vehicle, point, heading_rad, lane_width_m, changes_lane, named_lane });
-        })
-    })?;
+/// Fails if the file cannot be read, no vehicle moves, the vehicles do not follow a road, or a file of more
+/// than [`WINDOW_ROWS`] rows is not sorted by vehicle.
+pub(super) fn road_from_traffic(path: &Path, frame_rate_hz: f64) -> Result<InferredRoad, TrajectoryFileError> {
+    let road = if is_sorted(path)? {
+        InferredRoad::of(|visit| {
+            let mut poses = Poses::new(frame_rate_hz);
+            each_plane_row(path, |_, row| {
+                visit(poses.of_row(row));
+                Ok(())
+            })
+        })?
+    } else {
+        let rows = sorted_rows(path)?;
+        InferredRoad::of(|visit| {
+            let mut poses = Poses::new(frame_rate_hz);
+            rows.iter().for_each(|row| visit(poses.of_row(row)));
+            Ok::<(), TrajectoryFileError>(())
+        })?
+    };
     road.map_err(|problem| with_path(path, ReadError::of_file(problem)))
+}
+
+/// Returns true if the rows of each vehicle follow one another in the order of their frames.
+fn is_sorted(path: &Path) -> Result<bool, TrajectoryFileError> {
+    let mut ended: BTreeSet<u64> = BTreeSet::new();
+    let mut latest: Option<(u64, i64)> = None;
+    let mut is_sorted = true;
+    each_plane_row(path, |_, row| {
+        match latest {
+            Some((vehicle, frame)) if vehicle == row.vehicle => is_sorted &= row.frame >= frame,
+            Some((vehicle, _)) => {
+                ended.insert(vehicle);
+                is_sorted &= !ended.contains(&row.vehicle);
+            }
+            None => {}
+        }
+        latest = Some((row.vehicle, row.frame));
+        Ok(())
+    })?;
+    Ok(is_sorted)
+}
+
+/// Returns the rows in the order of vehicles and frames.
+fn sorted_rows(path: &Path) -> Result<Vec<PlaneRow>, TrajectoryFileError> {
+    let mut rows: Vec<PlaneRow> = Vec::new();
+    each_plane_row(path, |line, row| {
+        if rows.len() >= WINDOW_ROWS {
+            let problem = TrajectoryFileProblem::NotByVehicle { vehicle: row.vehicle, rows: WINDOW_ROWS };
+            return Err(ReadError::new(line, problem));
+        }
+        rows.push(*row);
+        Ok(())
+    })?;
+    rows.sort_by_key(|row| (row.vehicle, row.frame));
+    Ok(rows)
 }
 
 /// Returns the first of the values in `text` that semicolons separate.
@@ -178,30 +287,39 @@ fn first_of(text: &str) -> &str {
     text.split(';').next().unwrap_or_default().trim()
 }
 
-/// Calls `visit` with each row that has as many fields as the header.
-fn each_row(path: &Path, mut visit: impl FnMut(&ColumnIndices, &str, &Fields)) -> Result<(), TrajectoryFileError> {
+/// Calls `visit` with the line number and the content of each row that can be used.
+///
+/// # Errors
+/// The file cannot be read, or the first error of `visit`.
+fn each_plane_row(
+    path: &Path,
+    mut visit: impl FnMut(u64, &PlaneRow) -> Result<(), ReadError>,
+) -> Result<(), TrajectoryFileError> {
     let in_file = |error| with_path(path, error);
     let input = Digest::default().input(open_file(path)?).map_err(in_file)?;
-    rows(input, &mut visit).map_err(in_file)
+    visit_rows(input, &mut visit).map_err(in_file)
 }
 
-fn rows(input: impl BufRead, visit: &mut impl FnMut(&ColumnIndices, &str, &Fields)) -> Result<(), ReadError> {
+fn visit_rows(
+    input: impl BufRead,
+    visit: &mut impl FnMut(u64, &PlaneRow) -> Result<(), ReadError>,
+) -> Result<(), ReadError> {
     let mut lines = Lines::new(input);
     let mut fields = Fields::default();
-    let mut columns = None;
+    let mut columns: Option<(Separator, usize, ColumnIndices)> = None;
     loop {
         match lines.next() {
             Ok(Some((number, line))) => {
-                let split = fields.split(line, Separator::Comma);
-                let Some((needed, indices)) = &columns else {
-                    split.map_err(|problem| ReadError::new(number, problem))?;
-                    let header = Header::new((0..fields.len()).map(|index| fields.get(line, index)));
-                    let indices = ColumnIndices::new(&header).map_err(|problem| ReadError::new(number, problem))?;
-                    columns = Some((fields.len(), indices));
+                let Some((separator, needed, indices)) = &columns else {
+                    let at_header = |problem: TrajectoryFileProblem| ReadError::new(number, problem);
+                    let (header, separator, width) = Header::parse(line).map_err(at_header)?;
+                    let indices = ColumnIndices::new(&header).map_err(at_header)?;
+                    columns = Some((separator, width, indices));
                     continue;
                 };
-                if split.is_ok() && fields.len() == *needed {
-                    visit(indices, line, &fields);
+                let is_row = fields.split(line, *separator).is_ok() && fields.len() == *needed;
+                if is_row && let Ok(row) = indices.plane_row(line, &fields) {
+                    visit(number, &row)?;
                 }
             }
             Ok(None) => return Ok(()),
@@ -243,7 +361,7 @@ impl TextLayout for ExidColumns {
     }
 
     fn check_sides(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
-        self.sides.check(is_mirrored)
+        self.sides.check(is_mirrored, self.vehicles.len())
     }
 
     fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
@@ -262,27 +380,31 @@ impl TextLayout for ExidColumns {
         };
         vehicle.rows_read += 1;
         let class = vehicle.class;
+        let frame = integer(fields.get(line, self.columns.frame), "frame", allowed::FRAMES)?;
+        let time = Time::from_s(frame as f64 / self.data.frame_rate_hz);
+        let speed_mps = real(self.columns.speed, "lonVelocity", SPEED_MPS)?;
         // A vehicle keeps the direction of its first row, also on a curved ramp.
-        let latest_index = self.latest.filter(|(latest, _)| *latest == track).map(|(_, index)| index);
+        let clock = Clock::Continuous;
+        let piece = self.pieces.number(PlaneMoment { vehicle: track, time, point, heading_rad, speed_mps, clock });
+        let latest_index = self.latest.filter(|(latest, _)| *latest == piece).map(|(_, index)| index);
         let index = latest_index.or_else(|| self.road.direction(heading_rad)).unwrap_or(0);
-        self.latest = Some((track, index));
-        let named_lane = self.columns.named_lane(line, fields);
+        self.latest = Some((piece, index));
+        let named_lane = self.columns.named_lane(line, fields)?;
         let Some(Placed { s_m, d_m, lane }) = self.road.place(index, point, named_lane) else { return Ok(None) };
         if let Some(offset_m) = self.columns.offset_m(line, fields) {
-            self.sides.add(LaneOffset { vehicle: track, d_m, offset_m });
+            self.sides.add(LaneOffset { vehicle: piece, d_m, offset_m, lane });
         }
-        let frame = integer(fields.get(line, self.columns.frame), "frame", allowed::FRAMES)?;
         Ok(Some(Row {
             number: track,
             origin: Time::ZERO,
             vehicle_id: track,
             frame,
-            time: Time::from_s(frame as f64 / self.data.frame_rate_hz),
-            clock: Clock::Continuous,
+            time,
+            clock,
             s_m,
             d_m,
             lane,
-            speed_mps: real(self.columns.speed, "lonVelocity", SPEED_MPS)?,
+            speed_mps,
             acceleration_mps2: Some(real(self.columns.acceleration, "lonAcceleration", allowed::ACCELERATION_MPS2)?),
             length_m: real(self.columns.length, "length", allowed::LENGTH_M)?,
             width_m: real(self.columns.width, "width", allowed::WIDTH_M)?,

@@ -40,6 +40,9 @@ const LANE_M: f64 = 12.0 * FOOT_M;
 const MAX_LANES: u8 = 8;
 /// Distance by which the westbound direction is shifted to the right of the eastbound one (m).
 const SEPARATION_M: f64 = 1_000.0;
+/// Longest distance by which the noise of positions may move a vehicle back (m). An assumption with a plausible
+/// range of 5 to 20 m.
+const MOST_BACK_M: f64 = 10.0;
 /// Seconds since 1970, up to the year 2100.
 const TIME_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
 
@@ -176,6 +179,9 @@ impl Reader {
         let road = u32::from(direction < 0.0);
         self.has[road as usize] = true;
         let along_m: Vec<f64> = x_position.iter().map(|x| direction * FOOT_M * x + 0.5 * length_m).collect();
+        // A vehicle at rest may seem to move back by its position noise. One that moves further back contradicts its
+        // direction, and its speed shows that.
+        let is_against = along_m.first().zip(along_m.last()).is_some_and(|(first, last)| last - first < -MOST_BACK_M);
         for k in 0..count {
             let time_s = timestamp[k];
             if !TIME_S.contains(time_s) {
@@ -193,6 +199,7 @@ impl Reader {
             let mps = derived_speed_mps(k, count, |before, after| {
                 (along_m[after] - along_m[before], timestamp[after] - timestamp[before])
             });
+            let forward_mps = if is_against { mps.abs() } else { mps.max(0.0) };
             let right_m = FOOT_M * y_position[k].abs();
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
             let lane = ((right_m / LANE_M) as u8).saturating_add(1).min(MAX_LANES);
@@ -200,7 +207,7 @@ impl Reader {
                 vehicle,
                 time: Time::from_s(time_s),
                 position: Position::Road { road, s_m: along_m[k], d_m: -right_m, lane },
-                speed_mps: mps.clamp(0.0, allowed::SPEED_MPS.high),
+                speed_mps: forward_mps.min(allowed::SPEED_MPS.high),
                 acceleration_mps2: None,
                 length_m,
                 width_m,

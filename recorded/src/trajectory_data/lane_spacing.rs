@@ -10,7 +10,7 @@
 //! Lanes are 2.5 m (at roadworks) to 5.5 m (ramps) wide, as `markings` states. The lanes of US
 //! interstates are 12 ft, 3.66 m (AASHTO, *A Policy on Design Standards: Interstate System*). A
 //! single pair of lanes may be odd, as a ramp beyond a verge is. The lanes are refused if most
-//! pairs are.
+//! pairs are. Lanes are not too close if a single vehicle shows both: it may drive on the marking.
 
 use std::collections::BTreeMap;
 
@@ -31,10 +31,30 @@ const MOST_M: f64 = 6.0;
 /// 1.14.
 const LEAST_M: f64 = 1.4;
 
+/// The positions of vehicles in a recorded lane.
+struct LanePositions {
+    d_m: Vec<f64>,
+    /// Number of the vehicle, if it is the only one in the lane.
+    only_vehicle: Option<u64>,
+}
+
+impl LanePositions {
+    fn of_vehicle(vehicle: u64) -> Self {
+        Self { d_m: Vec::new(), only_vehicle: Some(vehicle) }
+    }
+
+    fn add(&mut self, row: &Row) {
+        self.d_m.push(row.d_m);
+        self.only_vehicle = self.only_vehicle.filter(|vehicle| *vehicle == row.number);
+    }
+}
+
 /// The middle of a recorded lane.
 struct Middle {
     lane: u8,
     d_m: f64,
+    /// Number of the vehicle, if it is the only one in the lane.
+    only_vehicle: Option<u64>,
 }
 
 /// The distance between the middles of two lanes without a recorded lane between them.
@@ -42,6 +62,8 @@ struct Spacing {
     lanes: [u8; 2],
     /// Distance for each lane (m).
     per_lane_m: f64,
+    /// `true` if a single vehicle shows both lanes.
+    is_of_one_vehicle: bool,
 }
 
 impl Spacing {
@@ -50,28 +72,33 @@ impl Spacing {
     fn of(first: &Middle, last: &Middle) -> Option<Self> {
         let (count, apart_m) = (last.lane - first.lane, (first.d_m - last.d_m).abs());
         let is_one_road = count == 1 || apart_m < CARRIAGEWAY_GAP_M;
-        is_one_road.then(|| Self { lanes: [first.lane, last.lane], per_lane_m: apart_m / f64::from(count) })
+        is_one_road.then(|| Self {
+            lanes: [first.lane, last.lane],
+            per_lane_m: apart_m / f64::from(count),
+            is_of_one_vehicle: first.only_vehicle.is_some() && first.only_vehicle == last.only_vehicle,
+        })
     }
 
     /// Returns true if the lanes are too far apart, or else too close.
     fn is_odd(&self, is_too_wide: bool) -> bool {
-        if is_too_wide { self.per_lane_m > MOST_M } else { self.per_lane_m < LEAST_M }
+        if is_too_wide { self.per_lane_m > MOST_M } else { self.per_lane_m < LEAST_M && !self.is_of_one_vehicle }
     }
 }
 
 /// Rejects rows in which the middles of most neighbouring lanes are too far apart, or too close.
 pub(super) fn check(rows: &[Row]) -> Result<(), ReadError> {
-    let mut lanes: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
+    let mut lanes: BTreeMap<u8, LanePositions> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.lane > 0) {
-        lanes.entry(row.lane).or_default().push(row.d_m);
+        lanes.entry(row.lane).or_insert_with(|| LanePositions::of_vehicle(row.number)).add(row);
     }
-    let judged = lanes.into_iter().filter(|(_, positions)| positions.len() >= LEAST_ROWS);
-    let middles: Vec<Middle> = judged.map(|(lane, positions)| Middle { lane, d_m: median(positions) }).collect();
+    let judged = lanes.into_iter().filter(|(_, positions)| positions.d_m.len() >= LEAST_ROWS);
+    let middle = |(lane, LanePositions { d_m, only_vehicle })| Middle { lane, d_m: median(d_m), only_vehicle };
+    let middles: Vec<Middle> = judged.map(middle).collect();
     let spacings: Vec<Spacing> = middles.windows(2).filter_map(|pair| Spacing::of(&pair[0], &pair[1])).collect();
     for is_too_wide in [true, false] {
         let odd: Vec<&Spacing> = spacings.iter().filter(|spacing| spacing.is_odd(is_too_wide)).collect();
         if let Some(first) = odd.first().filter(|_| 2 * odd.len() > spacings.len()) {
-            let Spacing { lanes, per_lane_m } = **first;
+            let Spacing { lanes, per_lane_m, .. } = **first;
             let cause = suspected_cause(Layout::Plain, is_too_wide);
             return Err(ReadError::of_file(TrajectoryFileProblem::LaneSpacing { lanes, per_lane_m, cause }));
         }
@@ -143,6 +170,25 @@ mod tests {
         }
         let of_each_lane = problem(&[(1, 0.1), (2, 0.0), (3, -0.1)]).unwrap();
         assert!(of_each_lane.contains("from the middle of each lane"), "{of_each_lane}");
+    }
+
+    #[test]
+    fn a_single_vehicle_on_the_marking_is_no_other_unit() {
+        let mut text =
+            "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+        for frame in 0..40 {
+            let (time_s, s_m, lane) = (0.1 * f64::from(frame), 3.0 * f64::from(frame), 1 + frame / 20);
+            let d_m = 3.4 + 0.01 * f64::from(frame);
+            writeln!(text, "1,{frame},{time_s:.1},{s_m},{d_m},{lane},30,0,4.5,1.8,car").unwrap();
+        }
+        let read = |text: &str| {
+            let tracks = open_from(text.as_bytes(), Path::new("a.csv"), ReadOptions::default(), usize::MAX);
+            tracks.and_then(|tracks| tracks.collect_all()).map(|data| data.trajectories.len())
+        };
+        assert!(matches!(read(&text), Ok(1)));
+        // A second vehicle on the same marking shows that the positions are no metres across the road.
+        let second: String = text.lines().skip(1).map(|row| row.replacen("1,", "2,", 1) + "\n").collect();
+        assert!(read(&(text.clone() + &second)).is_err());
     }
 
     #[test]

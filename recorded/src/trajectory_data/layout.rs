@@ -43,11 +43,11 @@ pub(super) fn is_drone_header(line: &str) -> bool {
 
 /// Determines the format of a highD or exiD tracks file.
 ///
-/// For exiD it calls `infer_road`, which derives the road from the traffic.
+/// For exiD it calls `infer_road` with the frame rate (Hz), which derives the road from the traffic.
 pub(super) fn drone_format(
     line: &str,
     meta: Meta,
-    infer_road: impl FnOnce() -> Result<InferredRoad, TrajectoryFileError>,
+    infer_road: impl FnOnce(f64) -> Result<InferredRoad, TrajectoryFileError>,
 ) -> Result<Format, Result<TrajectoryFileProblem, TrajectoryFileError>> {
     let (header, separator, width) = Header::parse(line).map_err(Ok)?;
     if separator == Separator::Semicolon {
@@ -55,7 +55,8 @@ pub(super) fn drone_format(
     }
     header.check_no_duplicates().map_err(Ok)?;
     let columns: Box<dyn TextLayout> = if is_exid(&header) {
-        Box::new(ExidColumns::new(&header, meta, infer_road().map_err(Err)?).map_err(Ok)?)
+        let road = infer_road(meta.data.frame_rate_hz).map_err(Err)?;
+        Box::new(ExidColumns::new(&header, meta, road).map_err(Ok)?)
     } else {
         Box::new(HighdColumns::new(&header, meta).map_err(Ok)?)
     };

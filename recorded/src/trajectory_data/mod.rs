@@ -96,6 +96,7 @@ mod osi;
 mod osi_messages;
 mod parquet;
 mod plain;
+mod plane_pieces;
 mod plausible;
 mod quality;
 mod reference_line;

@@ -170,7 +170,7 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
     let digest = Digest::default();
     let in_tracks = |error| with_path(&path, error);
     let input = digest.input(open_file(&path)?).map_err(in_tracks)?;
-    let source = TextSource::with_meta(input, || set.meta(&digest), || road_from_traffic(&path));
+    let source = TextSource::with_meta(input, || set.meta(&digest), |rate_hz| road_from_traffic(&path, rate_hz));
     let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
     check_choice(&source, &options).map_err(in_tracks)?;
     Tracks::new((&path, digest), Box::new(source), options, window)

@@ -38,6 +38,9 @@ const CONTRADICTED_SHARE: f64 = 0.75;
 /// Largest change of an offset between two rows that is a movement (m): where a vehicle enters another
 /// lane, the offset jumps by a lane width.
 const LARGEST_MOVEMENT_M: f64 = 1.0;
+/// Share of the lane changes to the other side above which the lanes contradict the offsets (-): at ramps,
+/// lanelets may overlap. An assumption with a plausible range of 0.1 to 0.4.
+const CONTRARY_SHARE: f64 = 0.25;
 
 /// One row, as the file states it: `d_m` is positive to the right.
 #[derive(Clone, Copy, Debug)]
@@ -162,12 +165,13 @@ impl Orientation {
 }
 
 /// The lateral position of a vehicle, and its offset from the centre of its lane (m), both positive to
-/// the left.
+/// the left. Lanes are counted from the left.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LaneOffset {
     pub(super) vehicle: u64,
     pub(super) d_m: f64,
     pub(super) offset_m: f64,
+    pub(super) lane: u8,
 }
 
 /// What the offsets of the rows so far say of the sides. The rows of a vehicle follow one another.
@@ -175,6 +179,9 @@ pub(super) struct LaneOffset {
 pub(super) struct OffsetSides {
     latest: Option<LaneOffset>,
     evidence: Evidence,
+    /// Lane changes to the side that the offset says, and to the other one.
+    to_stated_side: u64,
+    to_other_side: u64,
 }
 
 impl OffsetSides {
@@ -187,22 +194,33 @@ impl OffsetSides {
         if is_movement(moved_m) && is_movement(changed_m) {
             self.evidence.add(moved_m * changed_m > 0.0, moved_m.abs());
         }
+        // A vehicle that enters the lane to the left is right of its centre.
+        if changed_m.abs() > LARGEST_MOVEMENT_M && before.lane != row.lane {
+            let is_stated_side = (changed_m < 0.0) == (row.lane < before.lane);
+            *(if is_stated_side { &mut self.to_stated_side } else { &mut self.to_other_side }) += 1;
+        }
     }
 
-    /// Checks the rows so far; the lateral position is read as mirrored if `is_mirrored`.
+    /// Checks the rows so far, which are those of this number of vehicles; the lateral position is read as
+    /// mirrored if `is_mirrored`.
     ///
     /// # Errors
-    /// The offsets contradict the positions.
-    pub(super) fn check(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
-        match self.evidence.contradiction(is_mirrored, LEAST_EVIDENCE_M) {
-            Some(percent) => Err(TrajectoryFileProblem::SidesContradict {
+    /// The offsets contradict the positions, or the sides of lane changes.
+    pub(super) fn check(&self, is_mirrored: bool, vehicles: usize) -> Result<(), TrajectoryFileProblem> {
+        if let Some(percent) = self.evidence.contradiction(is_mirrored, LEAST_EVIDENCE_M) {
+            return Err(TrajectoryFileProblem::SidesContradict {
                 columns: "latLaneCenterOffset",
                 position: "yCenter",
                 percent,
                 compared: "the lateral movement",
-            }),
-            None => Ok(()),
+            });
         }
+        let all = self.to_stated_side + self.to_other_side;
+        let contrary = if is_mirrored { self.to_stated_side } else { self.to_other_side };
+        if contrary as f64 > CONTRARY_SHARE * all as f64 {
+            return Err(TrajectoryFileProblem::LaneChangesToTheOtherSide { contrary, all, vehicles });
+        }
+        Ok(())
     }
 }
 
@@ -219,21 +237,43 @@ mod tests {
                 for step in 0..70_u32 {
                     let left_m = 0.05 * f64::from(step);
                     let offset_m = if step < 35 { left_m } else { left_m - 3.5 };
-                    sides.add(LaneOffset { vehicle, d_m: sign * left_m, offset_m });
+                    sides.add(LaneOffset { vehicle, d_m: sign * left_m, offset_m, lane: 1 });
                 }
             }
             sides
         };
-        assert!(moved(1.0).check(false).is_ok() && moved(-1.0).check(true).is_ok());
+        assert!(moved(1.0).check(false, 10).is_ok() && moved(-1.0).check(true, 10).is_ok());
         for (sign, is_mirrored) in [(-1.0, false), (1.0, true)] {
-            let message = moved(sign).check(is_mirrored).unwrap_err().to_string();
+            let message = moved(sign).check(is_mirrored, 10).unwrap_err().to_string();
             assert!(message.contains("`latLaneCenterOffset` contradict `yCenter`"), "{message}");
         }
         let mut constant = OffsetSides::default();
         for step in 0..1_000_u32 {
-            constant.add(LaneOffset { vehicle: 1, d_m: -0.05 * f64::from(step), offset_m: 0.1 });
+            constant.add(LaneOffset { vehicle: 1, d_m: -0.05 * f64::from(step), offset_m: 0.1, lane: 1 });
         }
-        assert!(constant.check(false).is_ok());
+        assert!(constant.check(false, 1).is_ok());
+    }
+
+    #[test]
+    fn lane_changes_to_the_other_side_than_the_offset_says_are_refused() {
+        // Each vehicle changes from lane 2 to `lane` on the derived road, whose line follows its path. It
+        // enters the lane to the left, where its offset jumps back.
+        let changed = |lanes: &[u8]| {
+            let mut sides = OffsetSides::default();
+            for (vehicle, lane) in (0..).zip(lanes) {
+                sides.add(LaneOffset { vehicle, d_m: 0.0, offset_m: 1.7, lane: 2 });
+                sides.add(LaneOffset { vehicle, d_m: 0.0, offset_m: -1.7, lane: *lane });
+            }
+            sides
+        };
+        for fine in [&[][..], &[1], &[2], &[1, 1, 1, 3]] {
+            assert!(changed(fine).check(false, 4).is_ok(), "{fine:?}");
+        }
+        for (contrary, words) in [(&[3][..], "in 1 of 1 lane changes"), (&[1, 3], "in 1 of 2 lane changes")] {
+            let message = changed(contrary).check(false, 2).unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("the paths of 2 vehicles"), "{message}");
+        }
+        assert!(changed(&[3]).check(true, 1).is_ok() && changed(&[1]).check(true, 1).is_err());
     }
 
     /// Three vehicles in three lanes on a road towards the north-west; the second one changes lanes.

@@ -144,6 +144,18 @@ impl ReferenceLine {
         Self { vertices }
     }
 
+    /// Returns the largest distance between the line and the straight line between its ends (m).
+    pub(super) fn bend_m(&self) -> f64 {
+        let (Some(first), Some(last)) = (self.vertices.first(), self.vertices.last()) else { return 0.0 };
+        let (dx, dy) = (last.point.0 - first.point.0, last.point.1 - first.point.1);
+        let chord_m = maths::hypot(dx, dy);
+        let beside_m = |vertex: &Vertex| {
+            let (x_m, y_m) = (vertex.point.0 - first.point.0, vertex.point.1 - first.point.1);
+            if chord_m > SAME_POINT_M { (dx * y_m - dy * x_m).abs() / chord_m } else { maths::hypot(x_m, y_m) }
+        };
+        self.vertices.iter().map(beside_m).fold(0.0, f64::max)
+    }
+
     /// Returns the length of the line (m), or `None` if it has no extent.
     pub(super) fn length_m(&self) -> Option<f64> {
         self.vertices.last().filter(|_| self.vertices.len() > 1).map(|vertex| vertex.s_m)
@@ -214,6 +226,14 @@ mod tests {
         assert_eq!(at(-3.0, 1.0), (-3.0, 1.0));
         assert_eq!(at(25.0, -1.0), (25.0, -1.0));
         assert_eq!(ReferenceLine::through([(1.0, 1.0), (1.0, 1.0)].into_iter()).length_m(), None);
+    }
+
+    #[test]
+    fn the_bend_of_a_line_is_its_distance_from_the_chord() {
+        let bend_m = |points: &[Point]| ReferenceLine::through(points.iter().copied()).bend_m();
+        assert_eq!(bend_m(&[(3.0, 4.0)]), 0.0);
+        assert_eq!(bend_m(&[(0.0, 0.0), (10.0, 0.0), (40.0, 0.0)]), 0.0);
+        assert!((bend_m(&[(0.0, 0.0), (10.0, 0.2), (30.0, -1.5), (40.0, 0.0)]) - 1.5).abs() < 1e-12);
     }
 
     #[test]

@@ -68,7 +68,8 @@ impl<R: BufRead> Lines<R> {
 
         match std::str::from_utf8(&self.buffer) {
             Ok(line) => Ok(Some((self.number, line.trim()))),
-            Err(_) if self.number == 1 => Err((self.number, TrajectoryFileProblem::Binary)),
+            Err(_) if self.number == 1 && !is_latin(&self.buffer) => Err((self.number, TrajectoryFileProblem::Binary)),
+            Err(_) if self.number == 1 => Err((self.number, TrajectoryFileProblem::NotUtf8)),
             Err(_) => Err((self.number, TrajectoryFileProblem::NotText)),
         }
     }
@@ -85,6 +86,15 @@ fn has_carriage_returns(line: &[u8]) -> bool {
     // The end of a long line may be cut within a character.
     let is_text = std::str::from_utf8(line).map_or_else(|error| error.error_len().is_none(), |_| true);
     is_text && line.trim_ascii_end().contains(&b'\r')
+}
+
+/// Returns true if a line is text with separators in an encoding of one byte for each letter. The bytes 0xfe
+/// and 0xff are the marks of other encodings.
+fn is_latin(line: &[u8]) -> bool {
+    let is_text = |byte: &u8| (!byte.is_ascii_control() || byte.is_ascii_whitespace()) && *byte < 0xfe;
+    let is_separator = |byte: &u8| matches!(byte, b',' | b';' | b'\t' | b' ');
+    let other_letters = line.iter().filter(|byte| !byte.is_ascii()).count();
+    line.iter().all(is_text) && line.iter().any(is_separator) && 2 * other_letters < line.len()
 }
 
 /// Returns true if a file begins like text in UTF-16: with its byte order mark, or with a letter and a
@@ -242,6 +252,16 @@ mod tests {
             assert!(matches!(Lines::new(text.as_bytes()).next(), Err((1, TrajectoryFileProblem::CarriageReturns))));
         }
         assert_eq!(Lines::new("a,b\r\n1,2\r\n".as_bytes()).next().unwrap(), Some((1, "a,b")));
+    }
+
+    #[test]
+    fn a_header_in_another_encoding_is_no_binary_file() {
+        let first = |bytes: &[u8]| Lines::new(bytes).next().map(|_| ()).unwrap_err().1;
+        assert!(matches!(first(b"track_id,frame,L\xe4nge\n1,2,3\n"), TrajectoryFileProblem::NotUtf8));
+        for binary in [&b"\x01\xff\xfea,b\n"[..], b"\xff\xfe\xff\n", b"a\xff\xfe\xfd\n"] {
+            let problem = first(binary);
+            assert!(!matches!(problem, TrajectoryFileProblem::NotUtf8), "{problem}");
+        }
     }
 
     #[test]

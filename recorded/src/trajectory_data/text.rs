@@ -18,6 +18,8 @@ pub(super) struct TextSource<R> {
     format: Format,
     fields: Fields,
     name: Option<String>,
+    /// The first line, if it is a header.
+    header: Option<String>,
     /// The first line with its number, if it is a row instead of a header.
     first: Option<(u64, String)>,
     /// Length of the last field of the row before (bytes): a shorter one at the end of the file may
@@ -51,12 +53,12 @@ impl<R: BufRead> TextSource<R> {
     }
 
     /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts,
-    /// it calls `meta` for the content of the metadata files. For exiD it also calls `infer_road`,
-    /// which derives the road from the traffic.
+    /// it calls `meta` for the content of the metadata files. For exiD it also calls `infer_road` with
+    /// the frame rate (Hz), which derives the road from the traffic.
     pub(super) fn with_meta(
         source: R,
         meta: impl FnOnce() -> Result<Meta, TrajectoryFileError>,
-        infer_road: impl FnOnce() -> Result<InferredRoad, TrajectoryFileError>,
+        infer_road: impl FnOnce(f64) -> Result<InferredRoad, TrajectoryFileError>,
     ) -> Result<Self, Result<ReadError, TrajectoryFileError>> {
         let (lines, number, first) = read_first_line(source).map_err(Ok)?;
         if !is_drone_header(&first) {
@@ -64,18 +66,19 @@ impl<R: BufRead> TextSource<R> {
         }
         let format = drone_format(&first, meta().map_err(Err)?, infer_road)
             .map_err(|error| error.map(|problem| ReadError::new(number, problem)))?;
-        Ok(Self::at_start(lines, format, None))
+        Ok(Self::at_start(lines, format, (number, first)))
     }
 
     fn with_recognised_layout(lines: Lines<R>, number: u64, first: String) -> Result<Self, ReadError> {
         let format = recognise(&first).map_err(|problem| ReadError::new(number, problem))?;
-        let first = (!format.has_header).then_some((number, first));
-        Ok(Self::at_start(lines, format, first))
+        Ok(Self::at_start(lines, format, (number, first)))
     }
 
-    fn at_start(lines: Lines<R>, format: Format, first: Option<(u64, String)>) -> Self {
+    /// Creates the source after its first line, which is given with its number.
+    fn at_start(lines: Lines<R>, format: Format, first: (u64, String)) -> Self {
         let (fields, location) = (Fields::default(), Location::default());
-        Self { lines, format, fields, name: None, first, usual_last_field: 0, location }
+        let (header, first) = if format.has_header { (Some(first.1), None) } else { (None, Some(first)) };
+        Self { lines, format, fields, name: None, header, first, usual_last_field: 0, location }
     }
 }
 
@@ -126,7 +129,7 @@ impl<R: BufRead> RowSource for TextSource<R> {
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
-        let Self { lines, format, fields, name, first, usual_last_field, location } = self;
+        let Self { lines, format, fields, name, header, first, usual_last_field, location } = self;
         loop {
             let first = first.take();
             let (number, line) = match &first {
@@ -139,6 +142,9 @@ impl<R: BufRead> RowSource for TextSource<R> {
                     }
                 },
             };
+            if header.as_deref() == Some(line) {
+                return Err(ReadError::new(number, TrajectoryFileProblem::RepeatedHeader));
+            }
             let row = parse(line, format, fields, (name, location)).map_err(|error| ReadError::new(number, error))?;
             let last_field = fields.last_len();
             if lines.is_unterminated() && last_field < *usual_last_field {

@@ -117,6 +117,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
             vec!["line", "vehicle 1"],
         ),
         (format!("{PLAIN_HEADER}\n\"a,1,4\n"), vec!["line 2", "quoted field does not end"]),
+        (format!("{}{PLAIN_HEADER}\n", plain(&[row(&[])])), vec!["line 3", "the header stands here again"]),
         (format!("{}\n{}\n", ngsim(&[]), ngsim(&[(0, "2"), (11, "abc")])), vec!["line 2", "`v_Vel`", "is `abc`"]),
         (ngsim(&[(8, "-16")]), vec!["line 1", "`v_Length`"]),
         (ngsim(&[(10, "7")]), vec!["line 1", "`v_Class`", "motorcycle"]),

@@ -90,6 +90,49 @@ fn sumo_xml(jumps: bool) -> String {
     text + "</fcd-export>\n"
 }
 
+/// Two pairs of vehicles side by side. From 6 s on, the names of the first pair are exchanged if `are_exchanged`.
+fn side_by_side(are_exchanged: bool) -> String {
+    let mut text = "<fcd-export>\n".to_owned();
+    for time_s in times_s() {
+        writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
+        for (vehicle, lane, start_m) in [(0, 0, 0.0), (1, 1, 1.5), (2, 0, 60.0), (3, 1, 70.0)] {
+            let other = if are_exchanged && vehicle < 2 && time_s >= 6.0 { 1 - vehicle } else { vehicle };
+            let (front_m, y_m) = (start_m + 30.0 * time_s, SUMO_LANE_M * (f64::from(lane) - 2.5));
+            writeln!(
+                text,
+                "<vehicle id=\"{other}\" x=\"{front_m:.3}\" y=\"{y_m:.3}\" angle=\"90.00\" type=\"car\" speed=\"30.00\" \
+                 pos=\"{front_m:.2}\" lane=\"e0_{lane}\"/>"
+            )
+            .unwrap();
+        }
+        text += "</timestep>\n";
+    }
+    text + "</fcd-export>\n"
+}
+
+#[test]
+fn a_table_of_floating_car_data_in_another_order_has_the_same_lane_change() {
+    let text = sumo_table(";", true);
+    let (header, rows) = text.split_once('\n').unwrap();
+    let backwards: Vec<&str> = rows.lines().rev().collect();
+    let data = read_text(format!("{header}\n{}\n", backwards.join("\n")).as_bytes()).unwrap();
+    assert!(!data.is_in_doubt, "{:?}", data.notes);
+    // The names are no numbers: vehicles are numbered in the order of their first rows.
+    let changes = detect(&smooth(&data));
+    assert_eq!(changes.iter().map(|change| (change.track_id, change.direction)).collect::<Vec<_>>(), [(3, Side::Left)]);
+}
+
+#[test]
+fn exchanged_numbers_of_a_simulation_are_no_lane_changes_of_a_single_step() {
+    let has_single_steps = |data: &TrajectoryData| data.notes.iter().any(|note| note.contains("a single step"));
+    for (are_exchanged, jumps) in [(false, 0), (true, 2)] {
+        let data = read_text(side_by_side(are_exchanged).as_bytes()).unwrap();
+        assert_eq!(data.continuity.jumps, jumps, "{:?}", data.notes);
+        assert!(detect(&smooth(&data)).is_empty() && !has_single_steps(&data), "{:?}", data.notes);
+    }
+    assert!(has_single_steps(&read_text(sumo_xml(true).as_bytes()).unwrap()));
+}
+
 fn sumo_table(separator: &str, has_prefix: bool) -> String {
     let name = |name: &&str| if has_prefix { format!("vehicle_{name}") } else { (*name).to_owned() };
     let mut header = vec![if has_prefix { "timestep_time".to_owned() } else { "time".to_owned() }];
@@ -535,6 +578,13 @@ fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
 }
 
 #[test]
+fn trajectories_of_i24_motion_against_their_direction_are_refused() {
+    let turned = i24(true).replace("\"direction\":1,", "\"direction\":-1,");
+    let error = read_text(turned.as_bytes()).unwrap_err();
+    assert_mentions(&error, &["falls in the direction of travel of 10 of 20 vehicles"], "direction");
+}
+
+#[test]
 fn a_number_of_i24_motion_that_is_given_to_another_vehicle_splits_its_track() {
     // From frame 100 on, the number belongs to a vehicle 3,000 ft ahead.
     let text = i24(true).lines().next().unwrap().trim_end_matches(',').to_owned() + "]";
@@ -803,12 +853,84 @@ fn a_mirrored_data_set_of_exid_is_refused_and_the_named_options_mend_it() {
     assert!(read_with(folder.path(), ReadOptions { axes, ..ReadOptions::default() }).is_err());
 }
 
+/// Returns the lane changes of exiD's data set after `edit` of its rows: their fields in [`exid`]'s order.
+fn exid_changes(edit: impl Fn(Vec<Vec<String>>) -> Vec<Vec<String>>, separator: &str) -> Vec<(u64, Side)> {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &[], true);
+    let path = folder.path().join("05_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<String>>());
+    let header = lines.next().unwrap();
+    let rows = edit(lines.collect());
+    let rows = std::iter::once(&header).chain(&rows).map(|row| row.join(separator) + "\n");
+    std::fs::write(&path, rows.collect::<String>()).unwrap();
+    // Each vehicle has as many rows as its metadata states.
+    let meta = std::fs::read_to_string(folder.path().join("05_tracksMeta.csv")).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let rows_of = |vehicle: &str| text.lines().filter(|line| line.split(separator).nth(1) == Some(vehicle)).count();
+    let meta = meta.lines().map(|line| match line.split(',').nth(1).filter(|_| line.starts_with('5')) {
+        Some(vehicle) => format!("5,{vehicle},{},car\n", rows_of(vehicle)),
+        None => line.to_owned() + "\n",
+    });
+    std::fs::write(folder.path().join("05_tracksMeta.csv"), meta.collect::<String>()).unwrap();
+    let changes = detect(&smooth(&read(folder.path()).unwrap()));
+    changes.iter().map(|change| (change.track_id, change.direction)).collect()
+}
+
+#[test]
+fn a_data_set_of_exid_in_another_order_or_notation_has_the_same_lane_changes() {
+    let by_frame = |mut rows: Vec<Vec<String>>| {
+        rows.sort_by_key(|row| row[2].parse::<u32>().unwrap());
+        rows
+    };
+    let backwards = |mut rows: Vec<Vec<String>>| {
+        rows.reverse();
+        rows
+    };
+    let fractions = |mut rows: Vec<Vec<String>>| {
+        rows.iter_mut().for_each(|row| row[12] += ".0");
+        rows
+    };
+    let expected = [(2, Side::Left)];
+    assert_eq!(exid_changes(|rows| rows, ","), expected);
+    assert_eq!(exid_changes(by_frame, ","), expected);
+    assert_eq!(exid_changes(backwards, ","), expected);
+    assert_eq!(exid_changes(fractions, ","), expected);
+    assert_eq!(exid_changes(|rows| rows, "\t"), expected);
+}
+
+#[test]
+fn a_number_of_exid_that_is_used_again_is_not_the_path_of_a_road() {
+    // Vehicle 4 enters with the number of vehicle 3 after this has left.
+    let reused = |mut rows: Vec<Vec<String>>| {
+        for row in rows.iter_mut().filter(|row| row[1] == "4") {
+            row[1] = "3".to_owned();
+            row[2] = (row[2].parse::<u32>().unwrap() + 300).to_string();
+        }
+        rows
+    };
+    assert_eq!(exid_changes(reused, ","), [(2, Side::Left)]);
+}
+
+#[test]
+fn a_lanelet_that_is_no_number_is_refused_by_its_column() {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &[], true);
+    let path = folder.path().join("05_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace(",3.7,0,", ",3.7,right,").replace(",3.7,1,", ",3.7,left,")).unwrap();
+    assert_mentions(&read(folder.path()).unwrap_err(), &["column `laneletId`", "is `right`"], "names of lanelets");
+}
+
 #[test]
 fn urban_recordings_are_not_read_without_a_word() {
     let folder = tempfile::tempdir().unwrap();
     exid(folder.path(), &["latLaneCenterOffset", "laneWidth", "laneletId", "laneChange"], false);
     let data = read(folder.path()).unwrap();
     assert!(data.warnings()[0].contains("as in inD and rounD"), "{:?}", data.warnings());
+    // The longest path is the one of the vehicle that changes lanes, and four vehicles do not show that.
+    let few = "derived from the paths of 4 vehicles";
+    assert!(data.is_in_doubt && data.warnings().iter().any(|warning| warning.contains(few)), "{:?}", data.warnings());
 }
 
 #[test]

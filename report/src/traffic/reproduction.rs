@@ -18,7 +18,7 @@ use std::path::Path;
 use closecall_controllers::Wiedemann99Config;
 use closecall_recorded::encounter::RecordedEncounter;
 use closecall_recorded::following::FollowingInstant;
-use closecall_scenarios::{SampledEncounter, Setting, sampled};
+use closecall_scenarios::{SampledEncounter, Setting, name_of_other, sampled};
 use closecall_simulation::calibration::{Calibrated, ahead_of, calibrate_replaced, value_of};
 use closecall_traffic::Time;
 use serde::Serialize;
@@ -145,6 +145,8 @@ impl fmt::Display for Reproduction {
 /// Step 0 of a sampled lane change.
 #[derive(Clone, Debug)]
 pub struct StepZero {
+    /// The encounter, without vehicles whose recorded movements would end the run before the lane change.
+    pub encounter: RecordedEncounter,
     /// The calibrated driver.
     pub driver: Wiedemann99Config,
     /// Its scenario.
@@ -171,9 +173,44 @@ pub enum StepZeroError {
 /// Calibrates the driver of an encounter, and runs step 0. The second argument holds the path that names
 /// the source in error messages, and further settings.
 ///
+/// A run ends with the first collision. Recorded positions of two other vehicles may overlap, or do so after
+/// the end of a record, when a vehicle keeps its last speed. If the run then ends before the vehicle crosses
+/// the marking, one of the two is left out.
+///
 /// # Errors
 /// [`StepZeroError`] if the step cannot be run, or if no driver reproduces the recording.
 pub fn step_zero(
+    encounter: &RecordedEncounter,
+    inputs: (&Path, &[Setting]),
+    seed: u64,
+) -> Result<StepZero, StepZeroError> {
+    let mut encounter = encounter.clone();
+    loop {
+        let zero = closest(&encounter, inputs, seed)?;
+        if zero.reproduction.is_within_bounds() {
+            return Ok(zero);
+        }
+        match in_collision(&encounter, &zero.run.run) {
+            Some(index) => encounter.vehicles.remove(index),
+            None => return Err(StepZeroError::NotReproduced(Box::new(zero.reproduction))),
+        };
+    }
+}
+
+/// Returns the index of a vehicle without a role that collides with another one before the vehicle that
+/// changes lanes crosses the marking.
+fn in_collision(encounter: &RecordedEncounter, run: &SampledRun) -> Option<usize> {
+    let [one, other] = run.others_in_collision.as_ref().filter(|_| run.crossing_s.is_none())?;
+    let index_of = |name: &String| {
+        let mut others = encounter.vehicles.iter().enumerate().skip(encounter.roles());
+        let named = others.find(|(_, vehicle)| name_of_other(vehicle.trajectory.track_id) == *name);
+        named.map(|(index, _)| index)
+    };
+    index_of(other).or_else(|| index_of(one))
+}
+
+/// Returns the step 0 of the calibrated driver that reproduces the recording, or else of the closer one.
+fn closest(
     encounter: &RecordedEncounter,
     (source, settings): (&Path, &[Setting]),
     seed: u64,
@@ -194,19 +231,16 @@ pub fn step_zero(
         let collision = run.run.collision.as_ref().filter(|(_, time_s)| *time_s <= until.s());
         let collision = collision.map(|(other, time_s)| format!("it collides with {other} at {time_s:.2} s"));
         let reproduction = Reproduction::new([&recorded, &run.run], &ahead, (&driver, calibrated), collision);
-        Ok(StepZero { driver, step, recorded: recorded.clone(), run, reproduction })
+        let (encounter, recorded) = (encounter.clone(), recorded.clone());
+        Ok(StepZero { encounter, driver, step, recorded, run, reproduction })
     };
     let simple = attempt(Calibrated::SpeedAndHeadway)?;
     if simple.reproduction.is_within_bounds() {
         return Ok(simple);
     }
     let full = attempt(Calibrated::All)?;
-    if full.reproduction.is_within_bounds() {
-        return Ok(full);
-    }
     let is_simple_closer = simple.reproduction.relative_error < full.reproduction.relative_error;
-    let closer = if is_simple_closer { simple } else { full };
-    Err(StepZeroError::NotReproduced(Box::new(closer.reproduction)))
+    Ok(if is_simple_closer && !full.reproduction.is_within_bounds() { simple } else { full })
 }
 
 #[cfg(test)]

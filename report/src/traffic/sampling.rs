@@ -55,6 +55,9 @@ pub struct SampledRun {
     pub min_thw_opp2_s: Option<f64>,
     /// The first collision of the vehicle that changes lanes: the other vehicle and the time (s).
     pub collision: Option<(String, f64)>,
+    /// Names of the first two other vehicles that collide with each other.
+    #[serde(skip)]
+    pub(super) others_in_collision: Option<[String; 2]>,
     /// Positions of the vehicle that changes lanes: s and d (m).
     #[serde(skip)]
     path: Vec<(f64, f64)>,
@@ -93,8 +96,10 @@ impl SampledRun {
             let other = collision.between.iter().find(|id| *id != own_id)?;
             Some((other.to_string(), collision.time.s()))
         });
+        let of_others = outcome.collisions.iter().find(|collision| !collision.involves(own_id));
+        let others_in_collision = of_others.map(|collision| collision.between.each_ref().map(ToString::to_string));
         let run = Self::measured(name, &vehicles, [encounter.home, encounter.target], step.lane_change_s);
-        Self { value, collision, ..run }
+        Self { value, collision, others_in_collision, ..run }
     }
 
     /// Evaluates the recorded lane change, with the vehicles of `step`.
@@ -129,6 +134,7 @@ impl SampledRun {
             min_thw_opp1_s: smallest(&opp1),
             min_thw_opp2_s: smallest(&opp2),
             collision: None,
+            others_in_collision: None,
             path: path_of(own),
             positions: own.points.iter().map(|point| (point.time, point.s_m, point.d_m)).collect(),
             opponents: [vehicles.opp1, vehicles.opp2].map(|track| track.map(path_of).unwrap_or_default()),
