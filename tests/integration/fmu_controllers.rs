@@ -7,7 +7,7 @@ use std::process::Command;
 
 use closecall_testing::has_python;
 
-use crate::native_controllers::{assert_costs_fast_samples, campaign, is_as_baseline};
+use crate::native_controllers::{HAS_WHAT, assert_costs_fast_samples, campaign, is_as_baseline};
 use crate::support::{ROOT, code, folder, headline_with, message, program, records, stderr, stdout};
 
 /// Builds the FMU of the example, and returns the value of `--controller`.
@@ -99,8 +99,17 @@ fn a_fixed_step_divides_the_control_step() {
 }
 
 /// The faults of `faulty_fmu.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 8] = [
+const FAULTS: [(&str, &str); 9] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV))"),
+    (
+        "throws-cpp",
+        if HAS_WHAT {
+            "out of fmi2DoStep: catch it inside the function, and answer with an error | terminate called after throwing \
+             an instance of 'std::runtime_error' | what(): the solver has no state"
+        } else {
+            "out of fmi2DoStep: catch it"
+        },
+    ),
     ("hang", "failed at 2.00 s: no answer within 500 ms"),
     ("nan", "asked for an acceleration of NaN m/s² at 2.00 s"),
     ("state", "the FMU answered the state 7: the state must be 0 (following)"),
