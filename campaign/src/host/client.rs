@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use closecall_sensors::camera::Backend;
 use closecall_sensors::inference_backend;
 use closecall_simulation::SampleError;
-use closecall_simulation::controller::exec::{Child, ExecError};
+use closecall_simulation::controller::exec::{Child, ExecError, keep_left_over};
 use closecall_simulation::controller::isolated::Isolated;
 use closecall_simulation::perception::hosted;
 
@@ -96,6 +96,24 @@ pub(super) enum Trouble {
 /// of the sample.
 pub(crate) fn run(work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
     CLIENT.with_borrow_mut(|client| client.run(work, arm, sample, limit))
+}
+
+/// Ends the worker processes that this thread has for a work, all samples of which are done.
+pub(crate) fn end(work: &Work) {
+    CLIENT.with_borrow_mut(|client| client.end(work));
+}
+
+impl Client<OperatingSystem> {
+    fn end(&mut self, work: &Work) {
+        let address = std::ptr::from_ref(work) as usize;
+        for (index, arm) in work.arms.iter().enumerate() {
+            let Some(mut worker) = self.workers.remove(&(address, index)) else { continue };
+            let name = arm.controller.name();
+            if let Err(error) = worker.peer.finish_unloading(name) {
+                keep_left_over(name, &error);
+            }
+        }
+    }
 }
 
 impl<W: World> Client<W> {
