@@ -105,7 +105,7 @@ const FAULTS: [(&str, &str); 9] = [
         "throws-cpp",
         if HAS_WHAT {
             "out of fmi2DoStep: catch it inside the function, and answer with an error | terminate called after throwing \
-             an instance of 'std::runtime_error' | what(): the solver has no state"
+             an instance of 'std::runtime_error' | what():  the solver has no state"
         } else {
             "out of fmi2DoStep: catch it"
         },

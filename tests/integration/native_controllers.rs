@@ -169,7 +169,7 @@ const FAULTS: [(&str, &str); 15] = [
         "throws-cpp",
         if HAS_WHAT {
             "the library threw a C++ exception out of closecall_controller_step: catch it inside the function, and answer \
-             with an error | terminate called after throwing an instance of 'std::runtime_error' | what(): the map of lane 3 \
+             with an error | terminate called after throwing an instance of 'std::runtime_error' | what():  the map of lane 3 \
              is empty"
         } else {
             "the library threw a C++ exception out of closecall_controller_step: catch it inside the function"
@@ -405,6 +405,20 @@ fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_
             assert_eq!(stderr(&output).matches(expected).count(), 1, "{fault}, {jobs}: {}", stderr(&output));
         }
     }
+}
+
+#[test]
+fn a_library_that_stops_its_process_costs_its_sample_and_the_message_names_the_limit() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let mark = format!("stops-{}", std::process::id());
+    let mut command = program();
+    command.args(["campaign", "low-thw-overtake", "-n", "1", "--sensors", "object", "--no-gate", "--no-out"]);
+    command.args(["--controller", &library, "--controller-timeout-ms", "500", "--sample-timeout-s", "3"]);
+    command.env("FAULT_ALWAYS", "1").env("CLOSECALL_TEST_MARK", &mark);
+    let text = stdout(&with_fault(&mut command, Some("stops")), 5);
+    assert!(text.contains("first in sample 0: no outcome within 3 s of wall time\n"), "{text}");
+    assert_eq!(left_behind(&mark), Vec::<String>::new());
 }
 
 #[test]
