@@ -32,8 +32,8 @@ use super::start;
 const MEMORY_CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Number of answers to control steps after which the memory is looked at again, besides: the same
-/// steps in each repetition. A look takes a tenth of the time of a fast controller's step.
-const MEMORY_CHECK_ANSWERS: u64 = 4;
+/// steps in each repetition. A look takes a twentieth of the time of a fast controller's step.
+const MEMORY_CHECK_ANSWERS: u64 = 8;
 
 /// Time that a process has to end by itself once its standard input is closed, and its last output
 /// to arrive.
