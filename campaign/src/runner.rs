@@ -87,6 +87,10 @@ impl Samples for Work {
         arm.controller.in_thread(&mut || done = Some(self.run_here(sample, arm, on_outcome)));
         done.unwrap_or_else(|| self.run_here(sample, arm, on_outcome))
     }
+
+    fn end(&self) {
+        host::end(self);
+    }
 }
 
 impl Work {

@@ -36,6 +36,9 @@ const WINDOW_PER_WORKER: usize = 128;
 /// Time that running samples have to end after a stop was requested. Those that take longer are run
 /// again on resuming.
 const STOP_TIMEOUT: Duration = Duration::from_secs(5);
+/// Time that the threads of a pool have to end what they have started: the last process may be given
+/// half a second.
+const END_TIMEOUT: Duration = Duration::from_secs(2);
 /// Interval at which the time limit of running samples is checked.
 const WATCH_EVERY: Duration = Duration::from_millis(50);
 
@@ -87,6 +90,8 @@ pub(crate) trait Samples: Send + Sync + 'static {
     /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it.
     /// `on_outcome` gets the run before its validity checks, if it is checked in this process.
     fn run(&self, sample: u64, arm: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun;
+    /// Ends what this thread has started to run the samples, after the last one.
+    fn end(&self) {}
 }
 
 /// Samples without validity checks, which a function runs.
@@ -165,7 +170,10 @@ impl Workers {
         stop: &StopFlag,
         on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
     ) -> Result<(), E> {
-        WorkerPool::new(*self, work, stop)?.run(samples, on_finished)
+        let mut pool = WorkerPool::new(*self, work, stop)?;
+        pool.run(samples, on_finished)?;
+        pool.end();
+        Ok(())
     }
 }
 
@@ -215,8 +223,13 @@ pub(crate) struct WorkerPool<S> {
     results: Receiver<Done>,
     result_sender: Sender<Done>,
     slots: Vec<Slot>,
+    /// Each thread that has ended what it has started says so.
+    ends: Receiver<()>,
+    end_sender: Sender<()>,
     /// Number of runs submitted so far.
     submitted: u64,
+    /// Number of runs whose results have been returned.
+    returned: u64,
     /// Time of the last check of the time limits.
     checked: Instant,
 }
@@ -227,12 +240,25 @@ impl<S: Samples> WorkerPool<S> {
     /// # Errors
     /// [`WorkersError`] if the system refuses one.
     pub(crate) fn new(workers: Workers, work: &Arc<S>, stop: &StopFlag) -> Result<Self, WorkersError> {
-        let ((jobs, job_queue), (result_sender, results)) = (channel(), channel());
+        let ((jobs, job_queue), (result_sender, results), (end_sender, ends)) = (channel(), channel(), channel());
         let job_queue = Arc::new(Mutex::new(job_queue));
         let slots = Vec::with_capacity(workers.jobs.get());
         let (work, stop, checked) = (work.clone(), stop.clone(), Instant::now());
-        let mut pool =
-            Self { workers, work, stop, jobs, job_queue, results, result_sender, slots, submitted: 0, checked };
+        let mut pool = Self {
+            workers,
+            work,
+            stop,
+            jobs,
+            job_queue,
+            results,
+            result_sender,
+            slots,
+            ends,
+            end_sender,
+            submitted: 0,
+            returned: 0,
+            checked,
+        };
         for _ in 0..workers.jobs.get() {
             let slot = pool.spawn()?;
             pool.slots.push(slot);
@@ -266,6 +292,7 @@ impl<S: Samples> WorkerPool<S> {
                 self.submit(sample, arm);
             }
             if order.next == self.submitted {
+                self.returned = order.next;
                 return Ok(());
             }
             let is_idle = self.is_idle();
@@ -288,15 +315,38 @@ impl<S: Samples> WorkerPool<S> {
         }
     }
 
+    /// Ends the threads, if all runs are done, and waits a short time until each has ended what it has
+    /// started. Threads of a pool that ends early end by themselves.
+    fn end(self) {
+        if self.returned != self.submitted || self.stop.is_set() {
+            return;
+        }
+        drop(self.jobs);
+        let started = Instant::now();
+        for _ in &self.slots {
+            if self.ends.recv_timeout(END_TIMEOUT.saturating_sub(started.elapsed())).is_err() {
+                return;
+            }
+        }
+    }
+
     /// Starts a thread that works until there are no more jobs, or until it is abandoned.
     fn spawn(&self) -> Result<Slot, WorkersError> {
         let slot = Slot::default();
         let (own_slot, work, stop) = (slot.clone(), self.work.clone(), self.stop.clone());
         let (job_queue, result_sender) = (self.job_queue.clone(), self.result_sender.clone());
+        let end_sender = self.end_sender.clone();
         let limit = self.workers.sample_timeout;
         let body = move || {
             loop {
-                let Ok(job) = lock(&job_queue).recv() else { return };
+                // The other threads get the lock before this one ends.
+                let job = lock(&job_queue).recv();
+                let Ok(job) = job else {
+                    work.end();
+                    // Nobody may wait for it.
+                    end_sender.send(()).ok();
+                    return;
+                };
                 if stop.is_set() {
                     return;
                 }

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_simulation::controller::exec::take_bad_ends;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -12,6 +13,7 @@ use super::backend::choose_backend;
 use super::campaign::{CampaignArgs, run_campaign};
 use super::command::ONNXRUNTIME_VARIABLE;
 use super::keywords::arguments;
+use super::output::warn;
 use super::trajectories::{find_criticality, find_fit, find_lane_changes};
 use crate::exit_code::ExitCode;
 
@@ -45,6 +47,8 @@ fn campaign(args: &Campaign) -> Result<(ExitCode, Value), CliError> {
     let from_environment = || std::env::var_os(ONNXRUNTIME_VARIABLE).map(PathBuf::from);
     choose_backend(args.onnxruntime.clone().or_else(from_environment).as_deref());
     let mut report = Value::Null;
-    let code = run_campaign(&args.campaign, &mut |conclusion| report = conclusion.json())?;
+    let code = run_campaign(&args.campaign, &mut |conclusion| report = conclusion.json());
+    take_bad_ends().iter().for_each(warn);
+    let code = code?;
     Ok((code, report))
 }

@@ -19,7 +19,7 @@ use closecall_studies::explain::ExplanationText;
 use closecall_studies::exposure::{
     Counted, EventRule, ExposureText, StatedRange, exposure as compute_exposure, observe, shares_of,
 };
-use closecall_studies::failures::explain_failures;
+use closecall_studies::failures::{SampleErrors, explain_failures};
 use closecall_studies::map::{MapGrid, MapText, map as compute_map};
 use closecall_studies::minimize::{MinimizedText, NearestSearch, minimize_sample, output_files, write_files};
 use serde_json::json;
@@ -29,7 +29,7 @@ use super::actions::command_for;
 use super::advice::to_provide;
 use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
-use super::output::{during, outln, print_error, print_text, print_written, textln};
+use super::output::{during, outln, print_error, print_text, print_written, textln, warn};
 use super::protect::{must_be_folder, must_be_writable, of_campaign, protect};
 use super::saved::SavedArgs;
 use crate::exit_code::ExitCode;
@@ -76,12 +76,22 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         // The explanation does not depend on it.
         Err(error) => print_error(format_args!("warning: the explanation is not kept: {error}\n")),
     }
+    let errors = match args.sample {
+        Some(_) => None,
+        None => SampleErrors::of(&saved, args.scenario.as_deref(), None)?,
+    };
+    if let Some(errors) = &errors {
+        warn(errors);
+    }
     match (args.format, args.sample, &explanations[..]) {
         (Format::Json, Some(_), [explanation]) => {
             outln!("{:#}", stamped(json!(explanation), Some(explanation.seed), None))
         }
         (Format::Json, ..) => outln!("{:#}", stamped(json!(explanations), None, None)),
-        (Format::Human, _, []) => textln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
+        (Format::Human, _, []) => {
+            let with_outcome = if errors.is_some() { " that has an outcome" } else { "" };
+            textln!("no sample of {}{with_outcome} fails", args.scenario.as_deref().unwrap_or("the campaign"));
+        }
         (Format::Human, ..) => {
             for explanation in &explanations {
                 print_text(format_args!("{}\n", ExplanationText { explanation, folder: &args.dir, command_for }));
@@ -89,7 +99,8 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
             textln!("{LETTERS}");
         }
     }
-    Ok(ExitCode::Pass)
+    // That no sample fails is not known.
+    Ok(if errors.is_some() && explanations.is_empty() { ExitCode::SampleError } else { ExitCode::Pass })
 }
 
 /// Arguments of `closecall minimize`.

@@ -12,14 +12,14 @@ use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
 use closecall_campaign::session::set_arguments;
 use closecall_controllers::external::remove_unpacked;
-use closecall_simulation::controller::exec::{adopt_orphans, end_all};
+use closecall_simulation::controller::exec::{adopt_orphans, end_all, take_bad_ends};
 use closecall_traffic::shown::shown;
 use textwrap::{WordSeparator, WordSplitter};
 
 use super::backend::choose_backend;
 use super::groups::{Study, Tool, Traffic};
 use super::help::heading;
-use super::output::{announce, command_heartbeat, print_error, print_failure};
+use super::output::{announce, command_heartbeat, print_error, print_failure, warn};
 use super::terminal::error_columns;
 use super::version::{BUILD, name_commit};
 use super::{CliError, baseline, campaign, causes, check, compare, library, new, plot, replay, run, view};
@@ -356,6 +356,7 @@ pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
     drop(heartbeat);
     end_all();
     remove_unpacked();
+    take_bad_ends().iter().for_each(warn);
     match result {
         Ok(code) => code,
         Err(error) => {

@@ -13,6 +13,7 @@ use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError};
 use closecall_traffic::atomic::WriteError;
 use closecall_traffic::{Check, Parameters};
 
+use crate::failures::SampleErrors;
 use crate::map::MapError;
 
 /// The reason for which no cause can be found.
@@ -105,6 +106,16 @@ pub enum CausesError {
         /// The controller.
         controller: String,
     },
+    /// No vehicle collides in any sample that has an outcome, and some have none.
+    #[error("no sample of `{scenario}` that has an outcome fails with `{controller}`; {errors}")]
+    NoFailureAmongOutcomes {
+        /// The scenario.
+        scenario: String,
+        /// The controller.
+        controller: String,
+        /// The samples without an outcome.
+        errors: Box<SampleErrors>,
+    },
     /// No vehicle collides in the sample.
     #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples: {failing}")]
     Passes {
@@ -133,9 +144,11 @@ impl CausesError {
             Self::Scenario(error) if error.is_io() => FailureKind::Io,
             Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
             Self::Scenario(_) => FailureKind::InvalidInput,
-            Self::Sample { .. } | Self::NotRepeated { .. } | Self::NoOutcome { .. } | Self::NotReduced { .. } => {
-                FailureKind::Sample
-            }
+            Self::Sample { .. }
+            | Self::NotRepeated { .. }
+            | Self::NoOutcome { .. }
+            | Self::NotReduced { .. }
+            | Self::NoFailureAmongOutcomes { .. } => FailureKind::Sample,
             Self::Passes { .. }
             | Self::NoFailure { .. }
             | Self::Foreign { .. }

@@ -117,6 +117,24 @@ fn every_report_says_why_samples_failed_and_which_to_replay() {
     assert!(text.contains("nothere.py") && text.contains("ENDED EARLY"), "{text}");
 }
 
+#[test]
+fn samples_that_ended_in_an_error_are_not_said_to_pass() {
+    let folder = folder();
+    short(folder.path());
+    let out = folder.path().join("out");
+    let campaign = failing(folder.path(), "exec:python3 nothere.py", &["--out", "out"]);
+    assert_eq!(code(&campaign), 5, "{}", stderr(&campaign));
+    let errors = "2 of 2 samples ended in an error, and may fail or not; first sample 0 of low-thw-overtake: ";
+    let explained = closecall(["explain", out.to_str().unwrap()]);
+    assert_eq!(stdout(&explained, 5), "no sample of the campaign that has an outcome fails\n");
+    let warned = stderr(&explained);
+    assert!(warned.contains(&format!("warning: {errors}")) && warned.contains("nothere.py"), "{warned}");
+    let nearest = closecall(["minimize", out.to_str().unwrap(), "--nearest"]);
+    assert_eq!(code(&nearest), 5, "{}", stderr(&nearest));
+    let text = message(&nearest);
+    assert!(text.contains("that has an outcome fails with `exec`; ") && text.contains(errors), "{text}");
+}
+
 /// Runs a program in a terminal with as many rows as the first argument says, and 40 columns.
 const IN_TERMINAL: &str = r#"
 import fcntl, os, pty, struct, sys, termios

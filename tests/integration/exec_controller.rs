@@ -18,11 +18,12 @@ use crate::support::{closecall, code, folder, library, message, program, records
 const TIMEOUT_MS: &str = "2000";
 
 /// The faults of `bad.sh`: its arguments, and a part of the error message.
-const FAULTS: [(&str, &str); 18] = [
+const FAULTS: [(&str, &str); 19] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
     ("hangs", "the process hangs: no answer in twice the 2000 ms allowed, after 1 answer"),
+    ("buffers", "before its first answer; an answer is one line, which ends with a line feed and is flushed"),
     ("late 3", "the process answered later than the 2000 ms allowed, after 1 answer"),
     ("garbage", "the process answered \"what?\", which is not JSON"),
     ("nan", "asked for an acceleration of nan m/s², which is not a finite number"),
@@ -118,7 +119,8 @@ fn a_controller_that_uses_too_much_memory_is_stopped() {
         return;
     }
     // The memory of a process in the background is the controller's, although its parent has ended.
-    for words in ["", " background"] {
+    // A peak between two looks counts, too.
+    for words in ["", " background", " peak"] {
         let mark = format!("{}-hungry{}", std::process::id(), words.trim());
         let output = run_with(&format!("exec:python3 tests/fixtures/controllers/hungry.py{words}"), &mark);
         assert_eq!(code(&output), 5, "{words}: {}", stderr(&output));
@@ -176,6 +178,13 @@ fn a_script_that_is_there_but_cannot_be_started_is_told_why() {
         let shown = squeezed(&message(&output));
         assert!(shown.contains(&squeezed(expected)), "{name}: {}", stderr(&output));
         assert!(!shown.contains("Nosuchfile") && !shown.contains("Execformat"), "{name}: {}", stderr(&output));
+    }
+    let path = folder.path().join("no-right");
+    std::fs::write(&path, "#!/bin/sh\n").unwrap();
+    for (path, expected) in [(path.as_path(), "`chmod +x` gives it"), (folder.path(), "it is a folder")] {
+        let output = run_with(&format!("exec:{}", path.display()), "no-right");
+        assert_eq!(code(&output), 3, "{}", stderr(&output));
+        assert!(message(&output).contains(expected), "{}", stderr(&output));
     }
 }
 

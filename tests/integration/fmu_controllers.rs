@@ -99,8 +99,9 @@ fn a_fixed_step_divides_the_control_step() {
 }
 
 /// The faults of `faulty_fmu.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 8] = [
+const FAULTS: [(&str, &str); 9] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV))"),
+    ("throws-cpp", "the library threw a C++ exception out of fmi2DoStep: catch it inside the function"),
     ("hang", "failed at 2.00 s: no answer within 500 ms"),
     ("nan", "asked for an acceleration of NaN m/s² at 2.00 s"),
     ("state", "the FMU answered the state 7: the state must be 0 (following)"),

@@ -154,11 +154,15 @@ fn libraries_in_c_and_rust_have_the_outcomes_of_the_built_in_controller() {
 }
 
 /// The faults of `faulty.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 14] = [
+const FAULTS: [(&str, &str); 15] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV)); it last wrote: about to crash"),
     ("child", "the controller ended its process (signal: 11 (SIGSEGV))"),
     (
         "throws",
+        "SIGABRT)); it last wrote: the library threw a C++ exception out of closecall_controller_step: catch it",
+    ),
+    (
+        "throws-cpp",
         "SIGABRT)); it last wrote: the library threw a C++ exception out of closecall_controller_step: catch it",
     ),
     ("abort", "the controller ended its process (signal: 6 (SIGABRT))"),
@@ -362,7 +366,7 @@ fn a_crash_in_a_single_run_is_an_error_and_what_a_library_prints_is_no_answer() 
 }
 
 #[test]
-fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_library_is_unloaded_is_none() {
+fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_library_is_unloaded_a_warning() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
     let run = |fault| run_with_fault(&library, fault);
@@ -374,9 +378,37 @@ fn a_crash_while_a_controller_is_freed_is_an_error_of_its_run_and_one_while_its_
         assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
         assert!(message(&output).contains(expected), "{fault}: {}", stderr(&output));
     }
-    // A worker process of a campaign unloads the library after all its samples.
-    assert_eq!(stdout(&run("unloads"), 0), stdout(&run("none"), 0));
-    stdout(&campaign(&library, &folder.path().join("out"), "2", Some("unloads"), &[]), 0);
+    // A worker process of a campaign unloads the library after all its samples: no sample is
+    // concerned, whatever the number of jobs, and the console says so once.
+    let sound = run("none");
+    assert!(!stderr(&sound).contains("warning"), "{}", stderr(&sound));
+    let crashed = "warning: the process of `lib:faulty` ended with signal: 6 (SIGABRT) after its last sample, as it unloaded \
+                   its library; no sample is concerned; it last wrote: the map file is closed twice\n";
+    let left = "warning: the process of `lib:faulty` ended with exit status: 9 after its last sample";
+    for (fault, expected) in [("unloads", crashed), ("unloads-9", left)] {
+        let output = run(fault);
+        assert_eq!(stdout(&output, 0), stdout(&sound, 0));
+        assert_eq!(stderr(&output).matches(expected).count(), 1, "{fault}: {}", stderr(&output));
+        for jobs in ["1", "3"] {
+            let output = campaign(&library, &folder.path().join(format!("{fault}-{jobs}")), jobs, Some(fault), &[]);
+            stdout(&output, 0);
+            assert_eq!(stderr(&output).matches(expected).count(), 1, "{fault}, {jobs}: {}", stderr(&output));
+        }
+    }
+}
+
+#[test]
+fn a_library_that_stops_its_process_costs_its_sample_and_the_message_names_the_limit() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let mark = format!("stops-{}", std::process::id());
+    let mut command = program();
+    command.args(["campaign", "low-thw-overtake", "-n", "1", "--sensors", "object", "--no-gate", "--no-out"]);
+    command.args(["--controller", &library, "--controller-timeout-ms", "500", "--sample-timeout-s", "3"]);
+    command.env("FAULT_ALWAYS", "1").env("CLOSECALL_TEST_MARK", &mark);
+    let text = stdout(&with_fault(&mut command, Some("stops")), 5);
+    assert!(text.contains("first in sample 0: no outcome within 3 s of wall time\n"), "{text}");
+    assert_eq!(left_behind(&mark), Vec::<String>::new());
 }
 
 #[test]

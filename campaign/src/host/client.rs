@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use closecall_sensors::camera::Backend;
 use closecall_sensors::inference_backend;
 use closecall_simulation::SampleError;
-use closecall_simulation::controller::exec::{Child, ExecError};
+use closecall_simulation::controller::exec::{Child, ExecError, keep_left_over};
 use closecall_simulation::controller::isolated::Isolated;
 use closecall_simulation::perception::hosted;
 
@@ -88,7 +88,9 @@ thread_local! {
 pub(super) enum Trouble {
     /// The process crashed or hung. Another process may succeed.
     Crash(SampleFailure),
-    /// The process cannot be trusted, or the time of the sample is over.
+    /// The time of the sample is over.
+    Late,
+    /// The process cannot be trusted.
     Other(SampleFailure),
 }
 
@@ -96,6 +98,24 @@ pub(super) enum Trouble {
 /// of the sample.
 pub(crate) fn run(work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
     CLIENT.with_borrow_mut(|client| client.run(work, arm, sample, limit))
+}
+
+/// Ends the worker processes that this thread has for a work, all samples of which are done.
+pub(crate) fn end(work: &Work) {
+    CLIENT.with_borrow_mut(|client| client.end(work));
+}
+
+impl Client<OperatingSystem> {
+    fn end(&mut self, work: &Work) {
+        let address = std::ptr::from_ref(work) as usize;
+        for (index, arm) in work.arms.iter().enumerate() {
+            let Some(mut worker) = self.workers.remove(&(address, index)) else { continue };
+            let name = arm.controller.name();
+            if let Err(error) = worker.peer.finish_unloading(name) {
+                keep_left_over(name, &error);
+            }
+        }
+    }
 }
 
 impl<W: World> Client<W> {
@@ -115,6 +135,8 @@ impl<W: World> Client<W> {
         let failure = loop {
             let left = limit.saturating_sub(self.world.now() - started);
             match self.ask(work, arm, sample, left) {
+                // The message does not depend on the time that the process has taken to start.
+                Err(Trouble::Late) => break SampleError::Timeout { limit_s: limit.as_secs_f64() }.into(),
                 Ok(Answer { record, wall_s, check_s, .. }) => {
                     let flaky = first.map(|first| Flaky { crashes, first });
                     return ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
@@ -137,7 +159,7 @@ impl<W: World> Client<W> {
     }
 
     /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process
-    /// that has answered is kept.
+    /// that has answered is kept. `limit` is the time that is left.
     fn ask(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> Result<Answer, Trouble> {
         let key = (std::ptr::from_ref(work) as usize, arm);
         let mut worker = match self.workers.remove(&key) {
@@ -151,7 +173,7 @@ impl<W: World> Client<W> {
         let question = Question { task: worker.task.clone(), arm, sample, number: worker.asked };
         let answer = match worker.peer.request_within(line(&question), limit) {
             Ok(Some(line)) => self.world.read(work, &question, &line),
-            Ok(None) => Err(Trouble::Other(SampleError::Timeout { limit_s: limit.as_secs_f64() }.into())),
+            Ok(None) => Err(Trouble::Late),
             Err(error @ (ExecError::OutOfTurn { .. } | ExecError::LongLine { .. })) => {
                 Err(Trouble::Other(failure(&error)))
             }

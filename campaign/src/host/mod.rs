@@ -20,6 +20,9 @@
 //! A process that starts late may find another file, or be another version of this program. It then
 //! refuses its task, which ends the campaign.
 //!
+//! When all samples are done, a thread ends its process, which then unloads its library. A crash as
+//! it does so hits no sample: the command says it at its end.
+//!
 //! Records travel as lines of JSON, whose numbers read back to the same bits. A message says
 //! nothing about earlier samples of the same process, so that it does not depend on the number of
 //! jobs.
@@ -29,7 +32,7 @@ mod serve;
 #[cfg(test)]
 mod simulated_world;
 
-pub(crate) use client::run;
+pub(crate) use client::{end, run};
 pub use serve::serve;
 
 use std::fmt;

@@ -139,7 +139,7 @@ impl NativeSettings {
             let reason = format!("it is not loaded within {} s: its constructor may wait or loop", limit.as_secs_f64());
             return Err(NativeError::Crash { controller, reason });
         };
-        child.finish_unloading().map_err(crash)?;
+        child.finish_unloading(&self.name()).map_err(crash)?;
         match serde_json::from_slice(&line) {
             Ok(Probe::Identity(identity)) => Ok(identity),
             Ok(Probe::Refused { reason, is_io }) => Err(NativeError::Refused { controller, reason, is_io }),
@@ -316,7 +316,8 @@ impl ControllerFactory for NativeFactory {
         if !self.is_worker {
             let table = serde_json::to_string(table).unwrap_or_default();
             let process = self.settings.process(self.folder.as_deref(), &["step", &self.settings.text(), &table]);
-            return ExecFactory::new(process, self.folder.as_deref()).repeating_time().build(settings);
+            let steps = ExecFactory::new(process, self.folder.as_deref()).named(self.name.clone());
+            return steps.repeating_time().build(settings);
         }
         let path = path_in(self.folder.as_deref(), &self.settings);
         // Its constructor may loop.

@@ -47,6 +47,9 @@ impl ProgramError {
     /// Returns the message. A library or an object is not the process in which it runs.
     fn message(&self, kind: ProgramKind) -> String {
         match (kind, self) {
+            (ProgramKind::Exec, Self::Process(error)) => {
+                error.advice().map_or_else(|| error.to_string(), |advice| format!("{error}; {advice}"))
+            }
             (ProgramKind::Exec, _) | (_, Self::Slow(_) | Self::Stated(_)) => self.to_string(),
             (_, Self::Process(error)) => error.end_of_isolated(WHO).unwrap_or_else(|| error.to_string()),
             (ProgramKind::Lib, Self::Answer(error)) => error.without_line("the library"),
@@ -118,7 +121,7 @@ impl PerceptionProgram for PerceptionProcess {
         // The process of a library first frees the perception.
         let is_library = self.program.kind == ProgramKind::Lib;
         let limit = Duration::from_millis(self.program.timeout_ms);
-        let finished = if is_library { child.finish_run(limit) } else { child.finish() };
+        let finished = if is_library { child.finish_run(&self.program.name(), limit) } else { child.finish() };
         finished.map_err(|error| self.failure(&error.into(), time))
     }
 }
@@ -157,7 +160,7 @@ pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
         let waited_s = limit.as_secs_f64();
         return Err(fail(format!("it is not loaded within {waited_s} s: its constructor may wait or loop")));
     };
-    child.finish_unloading().map_err(crash)?;
+    child.finish_unloading(&program.name()).map_err(crash)?;
     match serde_json::from_slice(&line) {
         Ok(Probe::Identity(_)) => Ok(()),
         Ok(Probe::Refused { reason, is_io }) => {

@@ -10,12 +10,14 @@
 //! runs; `closecall explain` makes it.
 
 mod collect;
+mod errors;
 mod html;
 mod row;
 mod store;
 
 pub(crate) use collect::passes;
 pub use collect::{Failures, campaign_failures, explain_failures};
+pub use errors::SampleErrors;
 pub use html::{section, without_section};
 pub use row::{FailureRow, order};
 pub use store::{CAUSES, read_rows, write_rows};

@@ -26,7 +26,7 @@ use super::design_point::{Cases, DesignPoint};
 use super::run::{Minimized, described, with_choice};
 use super::trial::{Trial, WithoutOutcome};
 use crate::case::{Case, CausesError, fails};
-use crate::failures::passes;
+use crate::failures::{SampleErrors, passes};
 
 /// Number of failing samples from which the rays to the nominal case are searched (-), and number of
 /// rays with the nearest failures that are searched on (-): assumptions; 5 to 50 and 1 to 10 are
@@ -123,7 +123,10 @@ impl NearestSearch {
         let Some(&sample) = samples.first() else {
             // Only all samples together show that none fails.
             saved.folder().complete_records()?.try_for_each(|record| record.map(drop))?;
-            return Err(CausesError::NoFailure { scenario: name, controller });
+            return Err(match SampleErrors::of(saved, Some(&name), Some(&controller))?.map(Box::new) {
+                Some(errors) => CausesError::NoFailureAmongOutcomes { scenario: name, controller, errors },
+                None => CausesError::NoFailure { scenario: name, controller },
+            });
         };
         let sampling = saved.manifest().sampling;
         Ok(Self { case: Case { file, sampling, sample, arm, parameters: None, reference: None }, samples })

@@ -5,19 +5,23 @@
 //! answers, one drains standard error. Full pipes in both directions can therefore not block both
 //! sides. The threads end with the process, whose pipes then close.
 
+use std::fs::File;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::fs::FileExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, waitid};
 
 use super::error::{ExecError, is_long};
+use super::group::Group;
+use super::late::keep_bad_end;
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::processes::{self, Entry};
 use super::protocol::END;
@@ -26,6 +30,10 @@ use super::start;
 
 /// Interval at which the memory of the process is checked while its answer is awaited.
 const MEMORY_CHECK_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Number of answers to control steps after which the memory is looked at again, besides: the same
+/// steps in each repetition. A look takes a twentieth of the time of a fast controller's step.
+const MEMORY_CHECK_ANSWERS: u64 = 8;
 
 /// Time that a process has to end by itself once its standard input is closed, and its last output
 /// to arrive.
@@ -51,6 +59,16 @@ const BUFFERED_LINES: usize = 2;
 /// Size of the blocks in which standard error is read (bytes).
 const CHUNK_BYTES: usize = 4_096;
 
+/// How closely the memory of a process is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum MemoryLook {
+    /// At the answer to a control step. A peak since the last look is seen at the next one, which comes
+    /// 20 ms later, or at the end of the process, which serves one run.
+    Step,
+    /// At the answer of a process that serves several samples: a peak belongs to the last one.
+    Peak,
+}
+
 /// A child process with its pipes.
 pub struct Child {
     process: process::Child,
@@ -66,8 +84,12 @@ pub struct Child {
     /// Disconnected once standard error is closed.
     stderr_end: Receiver<()>,
     memory_mib: u64,
+    /// The group that limits the memory, where the system allows one.
+    group: Option<Group>,
     /// Number of answers so far, including the greeting.
     answered: u64,
+    /// The file that tells the resident memory of the process, if the system has one.
+    resident: Option<File>,
     /// When the memory of its descendants was looked at last.
     tree_looked: Instant,
     /// Whether the process has failed. It is then killed without time to end by itself.
@@ -117,11 +139,15 @@ impl Child {
             stderr: Arc::clone(&stderr_tail),
             stderr_end,
             memory_mib: settings.memory_mib,
+            group: None,
             answered: 0,
+            resident: None,
             tree_looked: Instant::now(),
             has_failed: true,
             entry: Some(entry),
         };
+        child.group = Group::of(child.process.id(), settings.memory_mib);
+        child.resident = File::open(format!("/proc/{}/statm", child.process.id())).ok();
         if let (Some(stdin), Some(stdout), Some(stderr)) = pipes {
             spawn_thread("write", move || write_all(stdin, &request_receiver)).map_err(start_error)?;
             spawn_thread("read", move || read_lines(stdout, &answer_sender)).map_err(start_error)?;
@@ -160,7 +186,7 @@ impl Child {
         let checked = if self.answered > 0 { self.reject_unrequested_line() } else { Ok(()) };
         let answer = checked.and_then(|()| {
             self.send(line);
-            self.wait(limit)
+            self.wait(limit, MemoryLook::Peak)
         });
         match &answer {
             Ok(Some(_)) => self.answered += 1,
@@ -177,6 +203,21 @@ impl Child {
     /// [`ExecError`] if a line is left over: an earlier line may have been taken for the answer to
     /// another question. [`ExecError::BadEnd`] if the process ends by a signal.
     pub fn finish(&mut self) -> Result<(), ExecError> {
+        match self.end()? {
+            Some(_) if self.has_exceeded() => Err(ExecError::Memory { limit_mib: self.memory_mib }),
+            Some(status) if status.signal().is_some() => Err(ExecError::BadEnd { status, stderr: self.last_lines() }),
+            Some(_) | None => Ok(()),
+        }
+    }
+
+    /// Closes the standard input of the process, and checks that it has written only its answers.
+    /// Returns its exit status if it ends by itself in a short time. If it does not, it is killed.
+    fn end(&mut self) -> Result<Option<process::ExitStatus>, ExecError> {
+        // A peak since the last look.
+        if self.exceeds_memory(MemoryLook::Peak) {
+            self.has_failed = true;
+            return Err(ExecError::Memory { limit_mib: self.memory_mib });
+        }
         self.requests = None;
         let started = Instant::now();
         let mut ended: Option<Instant> = None;
@@ -197,7 +238,7 @@ impl Child {
             }
         };
         match left_over {
-            None => self.check_end(EXIT_TIMEOUT.saturating_sub(started.elapsed())),
+            None => Ok(self.own_end(EXIT_TIMEOUT.saturating_sub(started.elapsed()))),
             Some(line) => {
                 self.has_failed = true;
                 Err(match line {
@@ -210,15 +251,16 @@ impl Child {
 
     /// Works like [`Self::finish`], for a process of this program with nothing left to do than to
     /// unload a library. How that ends the process is no error: the process of a campaign unloads the
-    /// library after all its samples.
+    /// library after all its samples. A bad end is kept under `name`: see
+    /// [`take_bad_ends`](super::take_bad_ends).
     ///
     /// # Errors
     /// [`ExecError`] if a line is left over.
-    pub fn finish_unloading(&mut self) -> Result<(), ExecError> {
-        match self.finish() {
-            Err(ExecError::BadEnd { .. }) => Ok(()),
-            finished => finished,
+    pub fn finish_unloading(&mut self, name: &str) -> Result<(), ExecError> {
+        if let Some(status) = self.end()?.filter(|status| !status.success()) {
+            keep_bad_end(name, status, &self.last_lines());
         }
+        Ok(())
     }
 
     /// Lets a process of this program free what it has run, and then ends it like
@@ -226,13 +268,13 @@ impl Child {
     ///
     /// # Errors
     /// [`ExecError`] if the process ends or hangs as it frees it, or if a line is left over.
-    pub fn finish_run(&mut self, limit: Duration) -> Result<(), ExecError> {
+    pub fn finish_run(&mut self, name: &str, limit: Duration) -> Result<(), ExecError> {
         let answer = self.request(format!("{END}\n").into_bytes(), limit)?;
         if answer != END.as_bytes() {
             self.has_failed = true;
             return Err(ExecError::OutOfTurn { answered: self.answered.saturating_sub(1), line: excerpt(&answer) });
         }
-        self.finish_unloading()
+        self.finish_unloading(name)
     }
 
     /// Returns the files that the process has mapped or opened, if the system tells.
@@ -289,11 +331,11 @@ impl Child {
             self.reject_unrequested_line()?;
         }
         self.send(line);
-        match self.wait(limit)? {
+        match self.wait(limit, MemoryLook::Step)? {
             Some(answer) => Ok(answer),
             // A second wait distinguishes a late process from one that hangs. The limit of a start
             // is long enough for that.
-            None => Err(match if is_long(limit.as_millis()) { None } else { self.wait(limit)? } {
+            None => Err(match if is_long(limit.as_millis()) { None } else { self.wait(limit, MemoryLook::Step)? } {
                 Some(_) => ExecError::Late { limit_ms: limit.as_millis(), answered: self.answered },
                 None => {
                     let (limit_ms, answered, stderr) = (limit.as_millis(), self.answered, self.last_lines());
@@ -335,14 +377,12 @@ impl Child {
     }
 
     /// Returns the next line, or `None` if there is none within the time limit.
-    fn wait(&mut self, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+    fn wait(&mut self, limit: Duration, look: MemoryLook) -> Result<Option<Vec<u8>>, ExecError> {
         let started = Instant::now();
         loop {
             let left = limit.saturating_sub(started.elapsed());
             let line = self.receive_within(left.min(MEMORY_CHECK_INTERVAL));
-            if line != Err(RecvTimeoutError::Disconnected)
-                && (self.peak_memory_mib() > self.memory_mib || self.tree_memory_mib() > self.memory_mib)
-            {
+            if line != Err(RecvTimeoutError::Disconnected) && self.exceeds_memory(look) {
                 return Err(ExecError::Memory { limit_mib: self.memory_mib });
             }
             match line {
@@ -361,6 +401,30 @@ impl Child {
         }
     }
 
+    /// Returns whether the process, or the process with its descendants, holds or held more memory than
+    /// allowed.
+    fn exceeds_memory(&mut self, look: MemoryLook) -> bool {
+        let is_due = self.tree_looked.elapsed() >= MEMORY_CHECK_INTERVAL;
+        if is_due {
+            self.tree_looked = Instant::now();
+        }
+        let is_counted = self.answered.is_multiple_of(MEMORY_CHECK_ANSWERS);
+        let limit = self.memory_mib;
+        (is_counted && self.resident_mib() > limit)
+            || ((is_due || look == MemoryLook::Peak) && self.peak_memory_mib() > limit)
+            || (is_due && self.tree_memory_mib() > limit)
+    }
+
+    /// Returns the resident memory of the process (MiB), or 0 if the system does not report it.
+    fn resident_mib(&self) -> u64 {
+        let mut text = [0; 128];
+        let read = self.resident.as_ref().and_then(|file| file.read_at(&mut text, 0).ok()).unwrap_or(0);
+        // Number of pages: of the address space, and of the resident part.
+        let pages =
+            std::str::from_utf8(&text[..read]).ok().and_then(|text| text.split(' ').nth(1)?.parse::<u64>().ok());
+        pages.map_or(0, |pages| (pages * page_bytes()).div_ceil(1 << 20))
+    }
+
     /// Returns the peak resident memory of the process (MiB), or 0 if the system does not report
     /// it, for example because the process has just ended.
     fn peak_memory_mib(&self) -> u64 {
@@ -372,13 +436,8 @@ impl Child {
     }
 
     /// Returns the memory of the process and its descendants (MiB), each page counted once, or 0 if
-    /// the process has none, or they have been looked at just before. A peak between two looks is
-    /// not seen.
-    fn tree_memory_mib(&mut self) -> u64 {
-        if self.tree_looked.elapsed() < MEMORY_CHECK_INTERVAL {
-            return 0;
-        }
-        self.tree_looked = Instant::now();
+    /// the process has none. A peak between two looks is not seen.
+    fn tree_memory_mib(&self) -> u64 {
         let process = self.process.id();
         let orphans = self.entry.as_ref().map_or_else(Vec::new, processes::orphans);
         // A process that has no others is looked at by its peak.
@@ -391,6 +450,11 @@ impl Child {
         tree.map(proportional_kib).sum::<u64>().div_ceil(1_024)
     }
 
+    /// Returns whether the system has killed the process or a descendant for its memory.
+    fn has_exceeded(&self) -> bool {
+        self.group.as_ref().is_some_and(Group::has_exceeded)
+    }
+
     /// Returns why standard output has ended: with the process, or before it.
     fn exit_error(&mut self) -> ExecError {
         let (has_ended, answered) = (self.ends_within(CLOSED_TIMEOUT), self.answered);
@@ -398,26 +462,24 @@ impl Child {
         // What the process wrote before its end may still be in the pipe: wait until it is read.
         let _ = self.stderr_end.recv_timeout(EXIT_TIMEOUT);
         match status {
+            _ if self.has_exceeded() => ExecError::Memory { limit_mib: self.memory_mib },
             Ok(status) if has_ended => ExecError::Ended { status, answered, stderr: self.last_lines() },
             _ => ExecError::Closed { answered, stderr: self.last_lines() },
         }
     }
 
-    /// Checks how the process ends by itself within `limit`. If it does not, it is killed, which is
-    /// no error.
-    fn check_end(&mut self, limit: Duration) -> Result<(), ExecError> {
+    /// Returns how the process ends by itself within `limit`. If it does not, it is killed.
+    fn own_end(&mut self, limit: Duration) -> Option<process::ExitStatus> {
         let has_ended = self.ends_within(limit);
         // The system may still write the memory dump of a process that has crashed. Its status then
         // names the signal of the crash.
         let is_killed = |status: process::ExitStatus| !has_ended && status.signal() == Some(Signal::KILL.as_raw());
-        match self.reap() {
-            Ok(status) if status.signal().is_some() && !is_killed(status) => {
-                // What the process wrote before its end may still be in the pipe.
-                let _ = self.stderr_end.recv_timeout(EXIT_TIMEOUT);
-                Err(ExecError::BadEnd { status, stderr: self.last_lines() })
-            }
-            Ok(_) | Err(_) => Ok(()),
+        let status = self.reap().ok().filter(|status| !is_killed(*status))?;
+        if !status.success() {
+            // What the process wrote before its end may still be in the pipe.
+            let _ = self.stderr_end.recv_timeout(EXIT_TIMEOUT);
         }
+        Some(status)
     }
 
     /// Returns the last lines of standard error.
@@ -468,6 +530,20 @@ impl Drop for Child {
         }
         drop(self.reap());
     }
+}
+
+/// Returns the size of a page (bytes), which the system tells each process at its start, or 4 KiB.
+fn page_bytes() -> u64 {
+    /// The key of the size among the pairs of key and value (`AT_PAGESZ` of `getauxval`).
+    const KEY: usize = 6;
+    const WORD: usize = size_of::<usize>();
+    static BYTES: OnceLock<u64> = OnceLock::new();
+    *BYTES.get_or_init(|| {
+        let told = std::fs::read("/proc/self/auxv").unwrap_or_default();
+        let word = |bytes: &[u8]| bytes.try_into().map(usize::from_ne_bytes).unwrap_or_default();
+        let mut pairs = told.chunks_exact(2 * WORD).map(|pair| (word(&pair[..WORD]), word(&pair[WORD..])));
+        pairs.find(|(key, _)| *key == KEY).map_or(4_096, |(_, bytes)| bytes as u64)
+    })
 }
 
 /// Returns the memory of a process (KiB), of shared pages its share; 0 if the system does not tell.

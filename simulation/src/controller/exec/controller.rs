@@ -91,6 +91,7 @@ impl ControllerFactory for ExecFactory {
         Box::new(ExecController {
             settings: self.settings.clone(),
             folder: self.folder.clone(),
+            name: self.name.clone(),
             ego_settings: *settings,
             repeats_time: self.repeats_time,
             lead_selector: LeadVehicleSelector::default(),
@@ -104,6 +105,7 @@ impl ControllerFactory for ExecFactory {
 struct ExecController {
     settings: ExecSettings,
     folder: Option<PathBuf>,
+    name: String,
     ego_settings: EgoSettings,
     repeats_time: bool,
     lead_selector: LeadVehicleSelector,
@@ -143,8 +145,11 @@ impl ExecController {
 impl ExecController {
     fn failure(&self, error: &ExecError, time: Time) -> ControllerError {
         // The process of a library or an FMU repeats the time.
-        let end = if self.repeats_time { error.end_of_isolated("the controller") } else { None };
-        let reason = end.unwrap_or_else(|| error.to_string());
+        let reason = match (self.repeats_time, error.advice()) {
+            (true, _) => error.end_of_isolated("the controller").unwrap_or_else(|| error.to_string()),
+            (false, Some(advice)) => format!("{error}; {advice}"),
+            (false, None) => error.to_string(),
+        };
         if error.is_late() { ControllerError::Late { reason, time } } else { ControllerError::Own { reason, time } }
     }
 }
@@ -164,7 +169,8 @@ impl EgoController for ExecController {
     fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
         let Some(child) = &mut self.child else { return Ok(()) };
         // The process of a library or an FMU first frees the controller.
-        let finished = if self.repeats_time { child.finish_run(self.settings.timeout()) } else { child.finish() };
+        let finished =
+            if self.repeats_time { child.finish_run(&self.name, self.settings.timeout()) } else { child.finish() };
         finished.map_err(|error| self.failure(&error, time))
     }
 }

@@ -152,6 +152,17 @@ impl ExecError {
         matches!(self, Self::Late { .. } | Self::Hangs { .. })
     }
 
+    /// Returns what the author of a process that never answers may have missed; `None` of another
+    /// error.
+    pub const fn advice(&self) -> Option<&'static str> {
+        match self {
+            Self::Hangs { answered: 0 | 1, .. } => {
+                Some("an answer is one line, which ends with a line feed and is flushed, before the next message comes")
+            }
+            _ => None,
+        }
+    }
+
     /// Returns how a library or another controller ended the process in which it runs; `None` if it
     /// did not. `who` ended it, such as `the controller`. The message does not depend on what the
     /// process did before: it is the same whether the process answers each step or runs whole
@@ -175,7 +186,7 @@ pub(super) const fn is_long(limit_ms: u128) -> bool {
 }
 
 /// Describes how a process ended: its exit status, or the name of its signal.
-fn how(status: ExitStatus) -> String {
+pub(super) fn how(status: ExitStatus) -> String {
     // Whether the system keeps a memory dump depends on its settings.
     status.to_string().replace(" (core dumped)", "")
 }
@@ -192,6 +203,6 @@ fn when(answered: u64) -> String {
 }
 
 /// Returns the part of a message that quotes the last lines of standard error, if there are any.
-fn last_lines(stderr: &str) -> String {
+pub(super) fn last_lines(stderr: &str) -> String {
     if stderr.is_empty() { String::new() } else { format!("; it last wrote: {stderr}") }
 }

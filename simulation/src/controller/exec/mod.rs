@@ -51,6 +51,8 @@
 mod child;
 mod controller;
 mod error;
+mod group;
+mod late;
 mod lines;
 mod processes;
 mod protocol;
@@ -62,6 +64,7 @@ pub use closecall_controllers::external::Identity;
 pub(crate) use controller::START_TIMEOUT;
 pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
+pub use late::{keep_left_over, take_bad_ends};
 pub use lines::NEW_SAMPLE;
 pub(crate) use lines::excerpt;
 pub use processes::{adopt_orphans, end_all};

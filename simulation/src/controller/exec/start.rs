@@ -1,7 +1,9 @@
 //! Why a program that is there cannot be started. The system answers "No such file or directory" if
-//! the *interpreter* of a script is absent, and "Exec format error" if a script names none.
+//! the *interpreter* of a script is absent, "Exec format error" if a script names none, and
+//! "Permission denied" of a file without the right to run.
 
 use std::io::{self, ErrorKind, Read};
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use closecall_traffic::input;
@@ -16,6 +18,9 @@ const MOST_BYTES: u64 = 256;
 pub(super) fn reason(path: &Path, error: &io::Error) -> Option<String> {
     let is_absent = error.kind() == ErrorKind::NotFound;
     let has_other_format = error.raw_os_error() == Some(Errno::NOEXEC.raw_os_error());
+    if error.kind() == ErrorKind::PermissionDenied {
+        return denied(path);
+    }
     // A bare name is looked for in PATH.
     if !(is_absent || has_other_format) || path.components().count() < 2 || !path.is_file() {
         return None;
@@ -32,6 +37,19 @@ pub(super) fn reason(path: &Path, error: &io::Error) -> Option<String> {
                 .to_owned(),
         ),
     }
+}
+
+/// Returns why the system denies to start the program at a path, if that can be told.
+fn denied(path: &Path) -> Option<String> {
+    const MAY_RUN: u32 = 0o111;
+    let file = path.metadata().ok()?;
+    if file.is_dir() {
+        return Some("it is a folder".to_owned());
+    }
+    let cannot_run = file.permissions().mode() & MAY_RUN == 0;
+    cannot_run.then(|| {
+        "nobody has the right to run it: `chmod +x` gives it, or name its interpreter, such as `python3`".to_owned()
+    })
 }
 
 /// Returns what is wrong with the interpreter that the first line of a script names after `#!`, or

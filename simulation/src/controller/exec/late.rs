@@ -1,0 +1,43 @@
+//! What went wrong with a process after its last answer, as it unloaded its library: a destructor
+//! of a static object that crashes, for example. No sample is concerned, so that none pays for it. A
+//! command says it at its end.
+
+use std::collections::BTreeSet;
+use std::process::ExitStatus;
+use std::sync::{Mutex, PoisonError};
+
+use super::error::{ExecError, how, last_lines};
+
+/// Largest number of messages that are kept. The text that a process writes may differ each time.
+const MOST_MESSAGES: usize = 5;
+
+static MESSAGES: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+/// Returns the messages about processes that ended badly since the last call, each once, at most 5.
+pub fn take_bad_ends() -> Vec<String> {
+    let messages = std::mem::take(&mut *MESSAGES.lock().unwrap_or_else(PoisonError::into_inner));
+    messages.into_iter().collect()
+}
+
+/// Keeps that the process of a controller or a perception ended with this status as it unloaded its
+/// library, and the last lines of its standard error.
+pub(super) fn keep_bad_end(name: &str, status: ExitStatus, stderr: &str) {
+    keep(format!(
+        "the process of `{name}` ended with {} after its last sample, as it unloaded its library; no sample is \
+         concerned{}",
+        how(status),
+        last_lines(stderr)
+    ));
+}
+
+/// Keeps that the process of a controller did not keep to the protocol after its last answer.
+pub fn keep_left_over(name: &str, error: &ExecError) {
+    keep(format!("after its last sample, the process of `{name}` failed; no sample is concerned: {error}"));
+}
+
+fn keep(message: String) {
+    let mut messages = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
+    if messages.len() < MOST_MESSAGES {
+        messages.insert(message);
+    }
+}
