@@ -186,6 +186,8 @@ pub struct Sensors {
     altered: Alterations,
     has_rear: bool,
     program: Option<ProgramSettings>,
+    /// Number of the draw of the noise behind; 0 for the draw of all runs.
+    rear_draw: u32,
 }
 
 impl Check for SensorsConfig {
@@ -229,6 +231,7 @@ impl Check for SensorsConfig {
             altered: Alterations::default(),
             has_rear: true,
             program: self.check_program(parameters)?,
+            rear_draw: 0,
         };
         sensors.check_program_in_mode()?;
         Ok(sensors.with_lidars(|lidar| Lidar { clustering, ..lidar }))
@@ -461,6 +464,13 @@ impl Sensors {
         Self { rear_object: self.rear_object.with_fit(fit), ..self }
     }
 
+    /// Returns the same sensors with another draw of the noise of the sensors behind: the full chain
+    /// beside itself shows how well any model of it can agree.
+    #[must_use]
+    pub fn with_rear_draw(self, number: u32) -> Self {
+        Self { rear_draw: number, ..self }
+    }
+
     /// Returns the errors of the ego's odometry and map.
     pub fn odometry_errors(&self) -> OdometryErrors {
         self.altered.faults.odometry
@@ -513,24 +523,26 @@ impl Sensors {
                 Box::new(ObjectPerception::new(models, key).with_faults(&self.altered.faults))
             }
             SensorMode::Full => {
-                let perception =
-                    FullPerception::new(&self.full, key).altered(self.altered).with_faults(&self.altered.faults);
+                let rear_key = &key.redrawn(self.rear_draw);
+                let perception = FullPerception::with_keys(&self.full, [key, rear_key])
+                    .altered(self.altered)
+                    .with_faults(&self.altered.faults);
                 if !self.has_rear {
                     return Ok(Box::new(perception.without_rear()));
                 }
                 let faults = self.altered.faults.rear_camera;
                 let images = self.program.and_then(|program| program.images);
-                let camera = images.map(|images| OutsideCamera::new(self.camera, images, key, faults));
+                let camera = images.map(|images| OutsideCamera::new(self.camera, images, rear_key, faults));
                 let perception = perception.with_program(program, camera);
                 match (self.altered.classifier(), self.camera.pipeline) {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),
                     (None, Pipeline::MaskRcnn) => {
-                        let detector = ImageDetector::new(self.camera, key, faults);
+                        let detector = ImageDetector::new(self.camera, rear_key, faults);
                         Box::new(perception.with_classifier(Box::new(detector)))
                     }
                     (None, Pipeline::CropClassifier) => {
-                        let classifier = WorkerClassifier::new(self.camera, key, faults);
+                        let classifier = WorkerClassifier::new(self.camera, rear_key, faults);
                         Box::new(perception.with_classifier(Box::new(classifier)))
                     }
                 }

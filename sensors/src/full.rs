@@ -71,13 +71,19 @@ pub struct FullPerception {
 impl FullPerception {
     /// Creates the sensors before their first step, with random streams keyed by `key`.
     pub fn new(model: &FullModel, key: &NoiseKey) -> Self {
+        Self::with_keys(model, [key; 2])
+    }
+
+    /// Creates the sensors before their first step. The first key is the key of the random streams
+    /// of the sensors ahead and around, the second key of those behind.
+    pub(crate) fn with_keys(model: &FullModel, [key, rear_key]: [&NoiseKey; 2]) -> Self {
         Self {
             front: ObjectSensor::front_radar(model.front_radar, key),
             front_lidar: model.front_lidar.map(|lidar| FrontLidar::new(lidar, model.tracker, key)),
             surround: ObjectSensor::surround(model.surround, key),
             rear: Some(
-                LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"])
-                    .with_radars(model.rear_radar.map(|radar| RearRadars::new(radar, key))),
+                LidarChain::new(model.rear_lidars(), model.tracker, rear_key, ["rear-lidar", "rear-lidar-fault"])
+                    .with_radars(model.rear_radar.map(|radar| RearRadars::new(radar, rear_key))),
             ),
             belief: Belief::default(),
             classifier: None,

@@ -3,6 +3,7 @@
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors                # sensors/data/rear-object.toml
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors -n 2 -o own.toml
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --errors       # the errors alone, with the ranges as built
+//!     cargo run --release -p closecall-xtask -- fit-object-sensors --ranges       # the ranges alone, with the errors as built
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --validate --seed 1
 //!
 //! A fit takes some minutes. The next build puts the figures into the sensor. With `--validate`,
@@ -17,7 +18,7 @@ use std::path::{Path, PathBuf};
 use closecall::scenarios::source;
 use closecall::traffic::atomic::write_file;
 use closecall_sensors::{Chain, RearFit};
-use closecall_studies::perception::fit::{FitPlan, at_bounds, fit, fit_errors};
+use closecall_studies::perception::fit::{FitPlan, at_bounds, fit, fit_errors, fit_ranges};
 use closecall_studies::perception::validation::{Measured, differences, measure, table};
 
 /// First line of the file.
@@ -37,12 +38,15 @@ pub(crate) struct Args {
     /// The file to write
     #[arg(short, long, default_value = "sensors/data/rear-object.toml")]
     output: PathBuf,
-    /// The fit to validate, or whose ranges stay, in place of the one that is built in
+    /// The fit to validate, or whose ranges or errors stay, in place of the one that is built in
     #[arg(long)]
     fit: Option<PathBuf>,
     /// Fit the errors and losses alone; the ranges stay as they are
     #[arg(long, conflicts_with = "validate")]
     errors: bool,
+    /// Fit the ranges alone; the errors, losses and scores stay as they are
+    #[arg(long, conflicts_with_all = ["validate", "errors"])]
+    ranges: bool,
     /// Measure the sensor as built beside the full chain, in place of a fit
     #[arg(long)]
     validate: bool,
@@ -57,9 +61,10 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         command: format!(
             "cargo run --release -p closecall-xtask -- fit-object-sensors {}{}-n {} --seed {}",
             args.fit.as_ref().map_or_else(String::new, |path| format!("--fit {} ", path.display())),
-            match (args.validate, args.errors) {
-                (true, _) => "--validate ",
-                (_, true) => "--errors ",
+            match args {
+                Args { validate: true, .. } => "--validate ",
+                Args { errors: true, .. } => "--errors ",
+                Args { ranges: true, .. } => "--ranges ",
                 _ => "",
             },
             args.approaches,
@@ -68,15 +73,13 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let fitted = match &args.fit {
-        Some(path) => std::fs::read_to_string(path)
-            .map_err(|error| error.to_string())
-            .and_then(|text| RearFit::parse(&text).map_err(|error| error.to_string()))
-            .map_err(|error| format!("failed to read {}: {error}", path.display()))?,
+        Some(path) => read_fit(path)?,
         None => RearFit::shipped()?.clone(),
     };
-    let model = match (args.validate, args.errors) {
-        (true, _) => validated(&plan, fitted)?,
-        (_, true) => fit_errors(&plan, &fitted)?,
+    let model = match args {
+        Args { validate: true, .. } => validated(&plan, fitted)?,
+        Args { errors: true, .. } => fit_errors(&plan, &fitted)?,
+        Args { ranges: true, .. } => fit_ranges(&plan, &fitted)?,
         _ => fit(&plan)?,
     };
     at_bounds(&model).iter().for_each(|warning| println!("warning: {warning}"));
@@ -84,6 +87,17 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn std::error::Error>> {
     write_file(&args.output, |file| file.write_all(text.as_bytes()))?;
     println!("written: {}", args.output.display());
     Ok(())
+}
+
+/// Reads the file of a fit.
+///
+/// # Errors
+/// A text that names the file, and what is wrong with it.
+pub(crate) fn read_fit(path: &Path) -> Result<RearFit, String> {
+    std::fs::read_to_string(path)
+        .map_err(|error| error.to_string())
+        .and_then(|text| RearFit::parse(&text).map_err(|error| error.to_string()))
+        .map_err(|error| format!("failed to read {}: {error}", path.display()))
 }
 
 /// Returns the fit with measurements of its tracks and of the full chain's tracks.

@@ -15,10 +15,11 @@ use std::fmt::{self, Display, Formatter};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use crate::fit_object_sensors::read_fit;
 use closecall::scenarios::source;
 use closecall::traffic::statistics::quantiles::quantile;
 use closecall::traffic::{Appearance, Plate, VehicleClass};
-use closecall_studies::perception::agreement::{Agreement, Pair};
+use closecall_studies::perception::agreement::{Agreement, Beside, Pair};
 
 /// The weather: its name and its settings.
 const CONDITIONS: [(&str, &[&str]); 4] = [
@@ -51,6 +52,13 @@ pub(crate) struct Args {
     /// Only the conditions whose names contain this text, such as `fog`
     #[arg(long, default_value = "")]
     condition: String,
+    /// Compare the full chain with itself under other noise of the rear sensors, in place of the
+    /// object-level sensors: no model can agree better
+    #[arg(long, conflicts_with = "fit")]
+    ceiling: bool,
+    /// The fit of the object-level sensor, in place of the one that is built in
+    #[arg(long)]
+    fit: Option<PathBuf>,
     /// Also write each sample as a row of this CSV file: appearance of the rear vehicle, and gap and
     /// time of the engagement
     #[arg(long)]
@@ -86,11 +94,16 @@ struct Comparison {
 /// If no condition has such a name, the scenario cannot be read, or a run fails.
 fn compare(args: &Args) -> Result<Comparison, Box<dyn std::error::Error>> {
     let wanted = CONDITIONS.into_iter().filter(|(name, _)| name.contains(&args.condition));
+    let beside = match &args.fit {
+        Some(path) => Beside::Fit(Box::leak(Box::new(read_fit(path)?))),
+        None if args.ceiling => Beside::OtherNoise,
+        None => Beside::Object,
+    };
     let mut conditions = Vec::new();
     for (name, settings) in wanted {
         let settings = settings.iter().map(|text| text.parse()).collect::<Result<Vec<_>, _>>()?;
         let file = source::load(Path::new(&args.scenario), &settings)?;
-        conditions.push(Compared { name, agreement: Agreement::of(&file, args.seed, args.samples)? });
+        conditions.push(Compared { name, agreement: Agreement::beside(beside, &file, args.seed, args.samples)? });
     }
     if conditions.is_empty() {
         let names = CONDITIONS.map(|(name, _)| name).join("`, `");

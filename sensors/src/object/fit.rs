@@ -11,6 +11,15 @@
 //! linearly in the logarithm of the paint's reflectivity and in the extinction. Beyond the grid,
 //! its border holds. A coarser grid of the same kind holds the ratios of body shapes, and further
 //! grids hold the errors ([`ErrorGrids`]).
+//!
+//! ```text
+//!   ego ▕ seen without interruption ▏ seen at a share of the distances ▏ never seen
+//!       0                           range                 intermittent · range
+//! ```
+//!
+//! The LiDAR sees only lamps and plate of a distant dark vehicle. Whether enough of its beams return
+//! enough light depends on where they hit, and so on the distance. The full chain has a track at some
+//! distances, loses it, and has it again.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -102,7 +111,8 @@ pub struct RangeGrid {
     pub class_range_m: Vec<Vec<f64>>,
 }
 
-/// The ranges of body shapes, as ratios to the ranges of the first shape of their class.
+/// The ranges of body shapes, as ratios to the ranges of the first shape of their class, and how
+/// each shape is seen beyond its range.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ShapeRatios {
@@ -116,6 +126,49 @@ pub struct ShapeRatios {
     /// For each shape and paint, the ratio of the distances from which on a vehicle is classified
     /// as one (-); 1 if a shape is absent.
     pub class_range: BTreeMap<String, Vec<Vec<f64>>>,
+    /// For each shape and paint, the ratio of the largest distance at which a vehicle is seen to its
+    /// range, within which it is seen without interruption, in each extinction (-); 1 if a shape is
+    /// absent.
+    pub intermittent: BTreeMap<String, Vec<Vec<f64>>>,
+    /// For each shape and paint, the share of the distances between these two at which a vehicle is
+    /// seen (-); 0 if a shape is absent.
+    pub intermittent_share: BTreeMap<String, Vec<Vec<f64>>>,
+}
+
+/// The distances at which one vehicle is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TargetRanges {
+    /// Distance within which the vehicle is seen in all scans, or in all scans of one side of the
+    /// mirror (m).
+    pub(super) range_m: f64,
+    /// Distance up to which its class is known (m).
+    pub(super) class_range_m: f64,
+    /// Distance beyond which it is never seen (m): at least the range.
+    pub(super) intermittent_m: f64,
+    /// Share of the distances between the range and `intermittent_m` at which it is seen (-).
+    pub(super) intermittent_share: f64,
+}
+
+impl TargetRanges {
+    /// The distances before they are known.
+    pub(super) const UNKNOWN: Self =
+        Self { range_m: f64::NAN, class_range_m: f64::NAN, intermittent_m: f64::NAN, intermittent_share: 0.0 };
+
+    /// Returns the distances of a vehicle that is never seen beyond its range, and whose class is
+    /// known up to `class_range_m` (m).
+    pub(super) fn without_interruption(range_m: f64, class_range_m: f64) -> Self {
+        Self { range_m, class_range_m, intermittent_m: range_m, intermittent_share: 0.0 }
+    }
+
+    /// Returns the distances, multiplied by a factor (-).
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        Self {
+            range_m: factor * self.range_m,
+            class_range_m: factor * self.class_range_m,
+            intermittent_m: factor * self.intermittent_m,
+            ..self
+        }
+    }
 }
 
 impl ByClass {
@@ -162,12 +215,18 @@ impl RearFit {
             check_grid(&format!("range[{index}].range-m"), &grid.range_m, knots, [1.0, 500.0])?;
             check_grid(&format!("range[{index}].class-range-m"), &grid.class_range_m, knots, [1.0, 500.0])?;
         }
-        let ShapeRatios { paints, extinctions_per_m, range, class_range } = &self.shapes;
+        let ShapeRatios { paints, extinctions_per_m, range, class_range, intermittent, intermittent_share } =
+            &self.shapes;
         let knots = [&**paints, &**extinctions_per_m];
         check_knots("shapes.", knots)?;
-        for (name, ratios) in [("range", range), ("class-range", class_range)] {
+        for (name, ratios, bounds) in [
+            ("range", range, [0.05, 20.0]),
+            ("class-range", class_range, [0.05, 20.0]),
+            ("intermittent", intermittent, [1.0, 50.0]),
+            ("intermittent-share", intermittent_share, [0.0, 1.0]),
+        ] {
             for (shape, ratios) in ratios {
-                check_grid(&format!("shapes.{name}.{shape}"), ratios, knots, [0.05, 20.0])?;
+                check_grid(&format!("shapes.{name}.{shape}"), ratios, knots, bounds)?;
             }
         }
         self.errors.check()?;
@@ -196,20 +255,34 @@ impl RearFit {
 
     /// Returns the distance up to which a vehicle is seen (m).
     pub fn range_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> f64 {
-        let [range_m, _] = self.ranges_m(class, appearance, environment);
-        range_m
+        self.ranges(class, appearance, environment).range_m
     }
 
-    /// Returns the distances up to which a vehicle is seen, and up to which its class is known (m).
-    pub(super) fn ranges_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> [f64; 2] {
+    /// Returns the distances at which a vehicle is seen.
+    pub(super) fn ranges(
+        &self,
+        class: VehicleClass,
+        appearance: &Appearance,
+        environment: &Environment,
+    ) -> TargetRanges {
         let at = [appearance.paint_reflectivity, extinction_per_m(environment)];
         let [range_m, class_range_m] = self.grid_m(class, appearance.plate, at);
-        let ShapeRatios { paints, extinctions_per_m, range, class_range } = &self.shapes;
+        let ShapeRatios { paints, extinctions_per_m, range, class_range, intermittent, intermittent_share } =
+            &self.shapes;
         let shape = appearance.body_shape.name();
-        let ratio = |ratios_by_shape: &BTreeMap<String, Vec<Vec<f64>>>| {
-            ratios_by_shape.get(shape).map_or(1.0, |ratios| interpolated([paints, extinctions_per_m], ratios, at))
+        let of_shape = |grids: &BTreeMap<String, Vec<Vec<f64>>>, absent: f64| {
+            grids.get(shape).map_or(absent, |grid| interpolated([paints, extinctions_per_m], grid, at))
         };
-        [range_m * ratio(range), class_range_m * ratio(class_range)]
+        let (range_m, class_range_m) = (range_m * of_shape(range, 1.0), class_range_m * of_shape(class_range, 1.0));
+        let intermittent_m = range_m * of_shape(intermittent, 1.0);
+        // If the class is known within the whole range, it is also known beyond.
+        let is_known_at_once = class_range_m >= KNOWN_AT_ONCE_SHARE * range_m;
+        TargetRanges {
+            range_m,
+            class_range_m: if is_known_at_once { class_range_m.max(intermittent_m) } else { class_range_m },
+            intermittent_m,
+            intermittent_share: of_shape(intermittent_share, 0.0),
+        }
     }
 
     /// Returns the ranges of the first body shape of a class, of a paint in air of an extinction
@@ -239,6 +312,10 @@ pub(super) fn interpolated(
     };
     in_row(row) + row_share * (in_row(row + 1) - in_row(row))
 }
+
+/// Share of the range from which on a class range counts as the whole range (-): the means of few
+/// approaches scatter by some 2 %.
+const KNOWN_AT_ONCE_SHARE: f64 = 0.98;
 
 /// Reflectivity of the paint of a usual car (-), and of a vehicle whose paint is not given.
 const USUAL_PAINT: f64 = 0.5;
@@ -334,6 +411,14 @@ mod tests {
                 refused(&|fit| fit.shapes.class_range.get_mut("pickup").unwrap()[0][0] = -1.0),
                 "shapes.class-range.pickup",
                 "0.05 to 20",
+            ),
+            (
+                refused(&|fit| {
+                    let grid = vec![vec![1.5; fit.shapes.extinctions_per_m.len()]; fit.shapes.paints.len()];
+                    fit.shapes.intermittent_share.insert("suv".to_owned(), grid);
+                }),
+                "shapes.intermittent-share.suv",
+                "0 to 1",
             ),
             (refused(&|fit| fit.range.retain(|grid| grid.class != VehicleClass::Truck)), "range", "truck"),
         ] {

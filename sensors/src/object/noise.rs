@@ -41,6 +41,11 @@ pub struct NoiseKey {
 }
 
 impl NoiseKey {
+    /// Returns the key of other random streams: another one for each number, and the same one for 0.
+    pub(crate) fn redrawn(&self, number: u32) -> Self {
+        Self { seed: self.seed ^ (u64::from(number) << 32), ..self.clone() }
+    }
+
     /// Returns the random stream of one channel, such as `front-radar`.
     pub fn stream(&self, channel: &str) -> Stream {
         stream(self.seed, self.sample, &self.ego, channel)

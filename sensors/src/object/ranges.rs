@@ -4,6 +4,7 @@ use closecall_traffic::{Environment, Vehicle, VehicleClass, maths};
 
 use super::config::ObjectSensorModel;
 use super::errors::TargetErrors;
+use super::fit::TargetRanges;
 use super::weather::range_in_weather_m;
 use crate::surroundings::OtherVehicle;
 
@@ -36,25 +37,24 @@ impl Ranges {
         self.usual_m = match model.fit {
             Some(fit) => {
                 let usual = Vehicle::typical(VehicleClass::Car);
-                let [range_m, _] = fit.ranges_m(usual.class, &usual.appearance, environment);
-                model.range_m / fit.usual_m() * range_m
+                model.range_m / fit.usual_m() * fit.range_m(usual.class, &usual.appearance, environment)
             }
             None => range_in_weather_m(model.range_m, environment),
         };
         true
     }
 
-    /// Returns the distances up to which one vehicle is seen, and up to which its class is known
-    /// (m). `deviation` is the deviation of the vehicle's ranges, in standard deviations.
-    pub(super) fn of_m(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> [f64; 2] {
-        let [range_m, class_range_m] = match (model.fit, &self.weather) {
+    /// Returns the distances at which one vehicle is seen. `deviation` is the deviation of the
+    /// vehicle's ranges, in standard deviations.
+    pub(super) fn of(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> TargetRanges {
+        let ranges = match (model.fit, &self.weather) {
             (Some(fit), Some(weather)) => {
                 let relative = model.range_m / fit.usual_m() * maths::exp(fit.range_spread * deviation);
-                fit.ranges_m(other.class, &other.appearance, weather).map(|range_m| relative * range_m)
+                fit.ranges(other.class, &other.appearance, weather).scaled(relative)
             }
-            _ => [self.usual_m, f64::INFINITY],
+            _ => TargetRanges::without_interruption(self.usual_m, f64::INFINITY),
         };
-        [range_m, model.class_range_m.unwrap_or(class_range_m)]
+        TargetRanges { class_range_m: model.class_range_m.unwrap_or(ranges.class_range_m), ..ranges }
     }
 
     /// Returns the errors of one vehicle whose range is `range_m` (m).

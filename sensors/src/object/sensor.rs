@@ -15,9 +15,10 @@ use closecall_traffic::{CONTROL_STEP, ClassScores, Source, StandardNormal, Track
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::{FaultStreams, Faulty};
+use super::fit::TargetRanges;
 use super::noise::{MeasurementErrors, NoiseKey, Scan, TargetNoise};
 use super::ranges::Ranges;
-use super::target::{Filters, Report, Target};
+use super::target::{Filters, PIECES, Report, Target};
 use super::visibility::{Direction, Field, Visibility};
 use crate::alterations::BACKGROUND;
 use crate::faults::{FaultList, ObjectFault};
@@ -127,7 +128,7 @@ impl ObjectSensor {
         // these distances.
         if self.direction == Direction::Behind && self.ranges.update(&self.model, input.scene.environment) {
             // Each vehicle gets its own when it is seen next.
-            self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
+            self.targets.iter_mut().for_each(|target| target.ranges = TargetRanges::UNKNOWN);
         }
         self.visibility.update(self.direction, input.others, &size);
         let before = list.tracks.len();
@@ -137,9 +138,11 @@ impl ObjectSensor {
         for (position, other) in input.others.iter().enumerate() {
             let index = self.target_index(other, position);
             let errors = self.errors(index, (position, other), input);
-            let is_classified = self.visibility.is_within(self.targets[index].class_range_m, position);
-            in_view += usize::from(errors.is_some());
-            measured += usize::from(errors.is_some_and(|errors| !errors.is_lost));
+            let is_classified = self.visibility.is_within(self.targets[index].ranges.class_range_m, position);
+            // Nobody expects a measurement of a vehicle beyond its range.
+            let expected = errors.filter(|_| !self.is_beyond_range(index, position));
+            in_view += usize::from(expected.is_some());
+            measured += usize::from(expected.is_some_and(|errors| !errors.is_lost));
             self.update_target(index, other, errors.map(|errors| (errors, is_classified)), &ego, list);
             self.report(index, other, input, list);
         }
@@ -147,6 +150,13 @@ impl ObjectSensor {
             self.degrade([in_view, measured], before, input, list);
         }
         self.step += 1;
+    }
+
+    /// Returns whether a vehicle at this place in the list is so far away that it is seen at some
+    /// distances only.
+    fn is_beyond_range(&self, index: usize, position: usize) -> bool {
+        let TargetRanges { range_m, intermittent_m, .. } = self.targets[index].ranges;
+        intermittent_m > range_m && !self.visibility.is_within(range_m * self.faulty.range_share(), position)
     }
 
     /// Returns the errors of the measurement of a vehicle at this place in the list; `None` if it
@@ -161,16 +171,22 @@ impl ObjectSensor {
         let has_faults = self.faulty.has_faults();
         let field = Field {
             direction: self.direction,
-            range_m: self.targets[index].range_m * self.faulty.range_share(),
+            range_m: self.targets[index].ranges.intermittent_m * self.faulty.range_share(),
             half_angle_tan: self.model.half_angle_tan,
             blocked: self.faulty.blocked_slopes(),
         };
         let is_seen = self.visibility.sees(&field, position, other, size) && !(has_faults && self.faulty.hides(other));
+        let is_beyond_range = self.is_beyond_range(index, position);
         let target = &mut self.targets[index];
         let is_far = !self.visibility.is_within(target.errors.far_m * self.faulty.range_share(), position);
+        let share = target.ranges.intermittent_share;
+        let is_shown = self.visibility.near_m(position).is_some_and(|near_m| target.is_seen_at(near_m, share));
         let scan = Scan {
             is_far,
-            lost: target.errors.losses.probability(self.step, is_far && target.is_confirmed()),
+            lost: match is_beyond_range && !is_shown {
+                true => 1.0,
+                false => target.errors.losses.probability(self.step, is_far && target.is_confirmed()),
+            },
             speed_sd_mps: self.model.speed_sd_mps.unwrap_or(0.0),
         };
         if !has_faults {
@@ -245,13 +261,13 @@ impl ObjectSensor {
             true => position,
             false => self.targets.iter().position(is_at).unwrap_or_else(|| self.add_target(other)),
         };
-        if self.targets[index].range_m.is_nan() {
+        if self.targets[index].ranges.range_m.is_nan() {
             let deviation = self.targets[index].range_deviation;
-            let [range_m, class_range_m] = self.ranges.of_m(&self.model, other, deviation);
-            let errors = self.ranges.errors(&self.model, other, range_m);
+            let ranges = self.ranges.of(&self.model, other, deviation);
+            let errors = self.ranges.errors(&self.model, other, ranges.range_m);
             let target = &mut self.targets[index];
             target.noise.draw_skipped(&target.errors);
-            (target.range_m, target.class_range_m, target.errors) = (range_m, class_range_m, errors);
+            (target.ranges, target.errors) = (ranges, errors);
         }
         index
     }
@@ -264,12 +280,15 @@ impl ObjectSensor {
         let stream = |purpose: &str| self.key.stream_about(&format!("{}-{purpose}", self.channel), actor);
         let has_faults = self.faulty.has_faults();
         let fault_streams = has_faults.then(|| FaultStreams::new(&self.key, self.channel, actor));
-        let range_deviation = if self.model.fit.is_some() { stream("range").sample(StandardNormal) } else { 0.0 };
+        let (range_deviation, pieces) = match self.model.fit.is_some() {
+            true => (stream("range").sample(StandardNormal), stream("intermittent").random()),
+            false => (0.0, [1.0; PIECES]),
+        };
         self.targets.push(Target {
             actor,
             range_deviation,
-            range_m: f64::NAN,
-            class_range_m: f64::NAN,
+            ranges: TargetRanges::UNKNOWN,
+            pieces,
             errors,
             noise,
             filters: None,

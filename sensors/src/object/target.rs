@@ -7,7 +7,14 @@ use closecall_traffic::{TrackId, TrackStatus};
 use super::config::MAX_LATENCY_STEPS;
 use super::errors::TargetErrors;
 use super::faulty::FaultStreams;
+use super::fit::TargetRanges;
 use super::noise::TargetNoise;
+
+/// Length of the pieces of road on which a vehicle beyond its range is seen or not (m): the usual
+/// length of the distances at which the full chain sees a dark SUV 90 to 130 m away.
+const PIECE_M: f64 = 5.0;
+/// Number of such pieces: 200 m. Farther away, nothing is seen beyond its range.
+pub(super) const PIECES: usize = 40;
 
 /// A track with its filters.
 #[derive(Clone, Copy, Debug)]
@@ -36,10 +43,11 @@ pub(super) struct Target {
     pub(super) actor: usize,
     /// Number of standard deviations by which the range of this vehicle deviates (-).
     pub(super) range_deviation: f64,
-    /// Range in this weather (m).
-    pub(super) range_m: f64,
-    /// Distance in this weather up to which the class of the vehicle is known (m).
-    pub(super) class_range_m: f64,
+    /// The distances in this weather at which the vehicle is seen.
+    pub(super) ranges: TargetRanges,
+    /// A random number from 0 to 1 for each piece of the road behind, which tells whether the
+    /// vehicle is seen there.
+    pub(super) pieces: [f64; PIECES],
     /// Its errors in this weather.
     pub(super) errors: TargetErrors,
     pub(super) noise: TargetNoise,
@@ -56,6 +64,14 @@ pub(super) struct Target {
 }
 
 impl Target {
+    /// Returns whether a vehicle that is seen at this share of the distances is seen at this one
+    /// (m).
+    pub(super) fn is_seen_at(&self, distance_m: f64, share: f64) -> bool {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a distance is not negative")]
+        let piece = (distance_m / PIECE_M) as usize;
+        self.pieces.get(piece).is_some_and(|drawn| *drawn < share)
+    }
+
     /// Returns whether the vehicle has a confirmed track.
     pub(super) fn is_confirmed(&self) -> bool {
         self.filters.as_ref().is_some_and(|track| track.lifecycle.status() != TrackStatus::Tentative)

@@ -201,6 +201,47 @@ fn the_track_of_a_hidden_vehicle_coasts_and_is_then_deleted() {
     assert!(tracks.iter().all(|track| track.x_m() > -40.0), "{tracks:?}");
 }
 
+#[test]
+fn beyond_its_range_a_vehicle_is_seen_at_a_share_of_the_distances() {
+    let fit = |share: f64| {
+        let mut fit = RearFit::shipped().unwrap().clone();
+        fit.range_spread = 0.0;
+        fit.range.iter_mut().flat_map(|grid| [&mut grid.range_m, &mut grid.class_range_m]).for_each(|grid| {
+            grid.iter_mut().flatten().for_each(|range_m| *range_m = 40.0);
+        });
+        let grid = |value: f64| vec![vec![value; fit.shapes.extinctions_per_m.len()]; fit.shapes.paints.len()];
+        let [ratios, shares] = [grid(2.5), grid(share)];
+        fit.shapes.intermittent.insert("saloon".to_owned(), ratios);
+        fit.shapes.intermittent_share.insert("saloon".to_owned(), shares);
+        &*Box::leak(Box::new(fit))
+    };
+    // The steps with a classified track that exists, within the range, up to 2.5 times the range,
+    // and beyond; and the numbers of all steps.
+    let counts = |share: f64, samples: u64| {
+        let (fit, none) = (fit(share), Parameters::default());
+        let mut counts = [[0; 2]; 3];
+        for sample in 0..samples {
+            let config = ObjectSensorConfig::default();
+            let rear = config.check_rear_object(&none).unwrap().with_fit(fit);
+            let models = [config.check_front_radar(&none).unwrap(), config.check_surround(&none).unwrap(), rear];
+            let (mut encounter, mut perception) = (Encounter::new(), ObjectPerception::new(models, &key(sample)));
+            while encounter.others[1].state.s_m < encounter.ego.state.s_m - 15.0 {
+                let gap_m = encounter.ego.state.s_m - encounter.others[1].state.s_m - 4.6;
+                let track = confirmed_track(perception.step(&encounter.scene()).unwrap(), Source::Rear);
+                let zone = usize::from(gap_m > 38.0) + usize::from(gap_m > 100.0);
+                counts[zone][0] +=
+                    u32::from(track.is_some_and(|track| track.existence >= 0.5 && track.class.is_vehicle()));
+                counts[zone][1] += 1;
+                encounter.advance();
+            }
+        }
+        counts.map(|[seen, all]| f64::from(seen) / f64::from(all))
+    };
+    assert_eq!(counts(0.0, 2), [1.0, 0.0, 0.0]);
+    let [near, between, beyond] = counts(0.4, 40);
+    assert!(near > 0.99 && (0.25..0.5).contains(&between) && beyond == 0.0, "{near} {between} {beyond}");
+}
+
 /// Returns the gaps behind the ego at which the rear vehicle, of a class and in fog of a
 /// visibility, is confirmed and classified (m).
 fn confirmed_and_classified_m(class: VehicleClass, visibility_m: f64, altered: &Alterations) -> [f64; 2] {

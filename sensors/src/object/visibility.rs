@@ -97,7 +97,13 @@ impl Visibility {
     /// Returns whether the nearest part of the vehicle with this place in the list is at most
     /// `range_m` away in the direction of view (m).
     pub(super) fn is_within(&self, range_m: f64, place: usize) -> bool {
-        range_m == f64::INFINITY || self.silhouette(place).is_some_and(|seen| seen.near_m <= range_m)
+        range_m == f64::INFINITY || self.near_m(place).is_some_and(|near_m| near_m <= range_m)
+    }
+
+    /// Returns the distance of the nearest part of the vehicle with this place in the list, in the
+    /// direction of view (m); `None` for one behind the sensor's plane.
+    pub(super) fn near_m(&self, place: usize) -> Option<f64> {
+        self.silhouette(place).map(|seen| seen.near_m)
     }
 
     fn silhouette(&self, place: usize) -> Option<Silhouette> {

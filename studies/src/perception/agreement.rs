@@ -8,12 +8,15 @@
 //!
 //! A second measure is the engagement of the system: the modes may agree on every collision, and
 //! still engage at different distances of the rear vehicle.
+//!
+//! The full chain does not agree with itself if the noise of its sensors is drawn anew. No model of
+//! it can agree better ([`Beside::OtherNoise`]).
 
 use closecall_campaign::runner::{Sampling, concrete};
-use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::sampling::Design;
-use closecall_sensors::SensorMode;
+use closecall_scenarios::{Scenario, ScenarioFile};
+use closecall_sensors::{RearFit, SensorMode, Sensors};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, SampleError, StepView, simulate};
 use closecall_traffic::{Appearance, CONTROL_STEP, Time, VehicleClass};
@@ -53,6 +56,17 @@ pub struct Pair {
     pub object: Verdict,
     /// With the full chain.
     pub full: Verdict,
+}
+
+/// The runs beside the runs with the full chain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Beside {
+    /// With object-level sensors.
+    Object,
+    /// With object-level sensors and another fit than that which ships.
+    Fit(&'static RearFit),
+    /// With the full chain, and other noise of the sensors behind.
+    OtherNoise,
 }
 
 /// All samples of a scenario in both modes.
@@ -154,15 +168,23 @@ impl Agreement {
     /// # Errors
     /// [`StudyError`] if a run fails.
     pub fn of(file: &ScenarioFile, seed: u64, samples: u64) -> Result<Self, StudyError> {
+        Self::beside(Beside::Object, file, seed, samples)
+    }
+
+    /// Does the same as [`Self::of`] with these runs beside the runs with the full chain.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a run fails.
+    pub fn beside(beside: Beside, file: &ScenarioFile, seed: u64, samples: u64) -> Result<Self, StudyError> {
         let sampling = Sampling { seed, design: Design::Random, samples };
         let pair = |sample| {
             let failed = |error: &dyn std::fmt::Display| StudyError::Run { sample, message: error.to_string() };
             let scenario = concrete(file, sampling, sample).map_err(|error| failed(&error))?;
             let key = RunKey { seed, sample };
-            let in_mode = |mode| {
+            let run = |scenario: &Scenario, mode| {
                 let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(mode) };
                 let mut gaps = RearGaps::default();
-                let outcome = simulate(&scenario, key, &arm, &mut gaps);
+                let outcome = simulate(scenario, key, &arm, &mut gaps);
                 outcome
                     .map(|outcome| Verdict::of(&outcome).with_gaps(&gaps))
                     .map_err(|error: SampleError| failed(&error))
@@ -171,7 +193,13 @@ impl Agreement {
                 let vehicle = scenario.vehicle(index, key);
                 (vehicle.class, vehicle.appearance)
             });
-            Ok(Pair { sample, rear, object: in_mode(SensorMode::Object)?, full: in_mode(SensorMode::Full)? })
+            let with_sensors = |sensors: Sensors, mode| run(&Scenario { sensors, ..scenario.clone() }, mode);
+            let object = match beside {
+                Beside::Object => run(&scenario, SensorMode::Object)?,
+                Beside::Fit(fit) => with_sensors(scenario.sensors.with_rear_fit(fit), SensorMode::Object)?,
+                Beside::OtherNoise => with_sensors(scenario.sensors.with_rear_draw(1), SensorMode::Full)?,
+            };
+            Ok(Pair { sample, rear, object, full: run(&scenario, SensorMode::Full)? })
         };
         Ok(Self { pairs: (0..samples).into_par_iter().map(pair).collect::<Result<_, StudyError>>()? })
     }

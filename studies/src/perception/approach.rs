@@ -236,33 +236,89 @@ fn follow(
     Ok(())
 }
 
-/// The gaps at which the track of a vehicle reaches a state for the first time (m). If it never
-/// does, the gap at the end of the approach.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Firsts {
-    /// The track is confirmed.
-    pub(crate) confirmed_m: f64,
-    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle:
-    /// the state that a function waits for.
+/// The gaps of an approach at which a vehicle has a track that a function can act on: confirmed, and
+/// existing at least as likely as not (m). A gap that is never reached is the gap at the end of the
+/// approach.
+///
+/// ```text
+///   ego ▕ track, but for short losses ▏ track at some gaps ▏ no track
+///       5                          lasting               first
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sightings {
+    /// The first gap with a track.
+    pub(crate) first_m: f64,
+    /// The gap from which on the track is never lost for more than [`LONGEST_LOSS_STEPS`].
+    pub(crate) lasting_m: f64,
+    /// The first gap, not beyond `lasting_m`, at which the track is classified as a vehicle.
     pub(crate) classified_m: f64,
+    /// Length of the gaps between `lasting_m` and `first_m` with a track.
+    pub(crate) beyond_m: f64,
 }
 
-/// Returns when the track of the vehicle is confirmed and classified.
+/// Longest loss of a track that lasts (steps): 0.48 s. The function in the library tolerates 0.5 s.
+const LONGEST_LOSS_STEPS: u32 = 12;
+/// Share of the gap from which on a track lasts at which the approach ends (-): an assumption. Where
+/// the gap is so much smaller, the received power is nearly three times as large.
+const SETTLED_SHARE: f64 = 0.6;
+
+/// The watch of an approach.
+struct Watch {
+    sightings: Sightings,
+    /// Number of latest steps without a track.
+    missed: u32,
+    /// The gap of the step before (m).
+    last_m: f64,
+}
+
+impl Watch {
+    fn new() -> Self {
+        let [_, end_m] = GAPS_M;
+        let sightings = Sightings { first_m: end_m, lasting_m: end_m, classified_m: end_m, beyond_m: 0.0 };
+        Self { sightings, missed: LONGEST_LOSS_STEPS + 1, last_m: end_m }
+    }
+
+    /// Adds a step at this gap (m). `track` tells whether there is a track, and whether it is
+    /// classified as a vehicle.
+    fn observe(&mut self, gap_m: f64, track: Option<bool>) {
+        let [_, end_m] = GAPS_M;
+        let Sightings { first_m, lasting_m, classified_m, beyond_m } = &mut self.sightings;
+        let Some(is_classified) = track else {
+            self.missed = self.missed.saturating_add(1);
+            return;
+        };
+        *first_m = first_m.max(gap_m);
+        if self.missed > LONGEST_LOSS_STEPS {
+            // The track before was one of those beyond.
+            *beyond_m += if *lasting_m > end_m { *lasting_m - self.last_m } else { 0.0 };
+            (*lasting_m, *classified_m) = (gap_m, end_m);
+        }
+        if is_classified {
+            *classified_m = classified_m.max(gap_m);
+        }
+        (self.missed, self.last_m) = (0, gap_m);
+    }
+
+    /// Returns whether the track has lasted, and been classified, for so long that nothing will
+    /// change at this gap (m) and below.
+    fn is_settled(&self, gap_m: f64) -> bool {
+        let [_, end_m] = GAPS_M;
+        self.missed == 0 && self.sightings.classified_m > end_m && gap_m < SETTLED_SHARE * self.sightings.lasting_m
+    }
+}
+
+/// Returns the gaps at which the vehicle has a track.
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
-pub(crate) fn firsts(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Firsts, SensorError> {
-    let mut firsts = Firsts { confirmed_m: GAPS_M[1], classified_m: GAPS_M[1] };
+pub(crate) fn sightings(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Sightings, SensorError> {
+    let mut watch = Watch::new();
     follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
-        let Some(track) = track else { return true };
-        firsts.confirmed_m = firsts.confirmed_m.max(gap_m);
-        let is_classified = track.existence >= 0.5 && track.class.is_vehicle();
-        if is_classified {
-            firsts.classified_m = gap_m;
-        }
-        !is_classified
+        let track = track.filter(|track| track.existence >= 0.5).map(|track| track.class.is_vehicle());
+        watch.observe(gap_m, track);
+        !watch.is_settled(gap_m)
     })?;
-    Ok(firsts)
+    Ok(watch.sightings)
 }
 
 /// Returns the scores of the true class between two gaps (m).

@@ -1,16 +1,17 @@
 //! The fit of the rear object-level sensor to the full chain.
 //!
 //! ```text
-//!  scenario ─▶ full chain ─┬▶ distances of the first confirmed track and of the first one that is classified as a vehicle,
+//!  scenario ─▶ full chain ─┬▶ distances from which on a confirmed track lasts, and is classified as a vehicle,
 //!                          │  over class, paint, plate, shape, extinction ─▶ ranges
 //!                          ├▶ errors and losses of the tracks over class, paint, extinction ─▶ those of the measurements
 //!                          └▶ scores of the true class ─▶ confidence
 //! ```
 //!
 //! Only perception is fitted: no controller runs, and no collision counts. A range is the mean
-//! distance of the first confirmed track, plus the distance that the object-level sensor itself
-//! needs to confirm a vehicle. A class range is the mean distance at which a confirmed track is
-//! first classified as a vehicle, plus the distance that the latency costs. It is a distance and no
+//! distance from which on a confirmed track lasts, plus the distance that the object-level sensor
+//! itself needs to confirm a vehicle. Beyond, a body shape is seen at a share of the distances. A
+//! class range is the mean distance at which a track that lasts is first classified as a vehicle,
+//! plus the distance that the latency costs. It is a distance and no
 //! time, because the full chain recognises a vehicle in fog at nearly the same distance at all
 //! closing speeds. The errors of the measurements are fitted until the tracks have the errors of
 //! the full chain.
@@ -19,10 +20,10 @@ use std::collections::BTreeMap;
 
 use closecall_scenarios::{Scenario, ScenarioFile, Setting};
 use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
-use closecall_traffic::{BodyShape, Environment, Plate, VehicleClass, maths};
+use closecall_traffic::{BodyShape, Environment, Plate, Vehicle, VehicleClass, maths};
 use rayon::prelude::*;
 
-use crate::perception::approach::{Address, Firsts, firsts, scores};
+use crate::perception::approach::{Address, Sightings, scores, sightings};
 use crate::perception::cases::Case;
 use crate::perception::study::StudyError;
 
@@ -38,8 +39,8 @@ const PAINTS: [f64; 6] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.8];
 const VISIBILITIES_M: [f64; 9] = [10_000.0, 1_000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0];
 /// Extinction multiplied by visibility: Koschmieder's contrast threshold of 2 %.
 const KOSCHMIEDER: f64 = 3.912;
-/// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid.
-const SHAPE_PAINTS: [f64; 2] = [0.1, 0.4];
+/// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid in fog.
+const SHAPE_PAINTS: [f64; 6] = PAINTS;
 const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
 /// Gaps between which the class scores of tracks are taken (m).
 const GAPS_M: [f64; 2] = [20.0, 80.0];
@@ -96,6 +97,28 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
     Ok(RearFit { errors: fitter.error_grids(&ranges)?, ..ranges })
 }
 
+/// Fits the ranges alone to the full chain. The errors, the losses and the scores are the same as
+/// in another fit. The validation of that fit does not hold for the new one.
+///
+/// # Errors
+/// Works like [`fit`].
+pub fn fit_ranges(plan: &FitPlan<'_>, errors: &RearFit) -> Result<RearFit, StudyError> {
+    let fitter = Fitter::new(plan)?;
+    let usual = Vehicle::typical(VehicleClass::Car);
+    let usual_errors = errors.errors.at(usual.class, &usual.appearance, &Environment::CLEAR_DAY);
+    let (range, range_spread) = fitter.ranges(&usual_errors)?;
+    Ok(RearFit {
+        origin: plan.origin(),
+        range_spread,
+        paints: PAINTS.to_vec(),
+        extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
+        range,
+        shapes: fitter.shapes()?,
+        validation: None,
+        ..errors.clone()
+    })
+}
+
 /// Fits the errors alone to the full chain, with the ranges of another fit. The validation of that
 /// fit does not hold for the new one.
 ///
@@ -130,10 +153,24 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Returns the mean distances at which tracks are confirmed and classified (m).
-fn means_m(firsts: &[Firsts]) -> [f64; 2] {
-    let mean_m = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
-    [mean_m(|firsts| firsts.confirmed_m), mean_m(|firsts| firsts.classified_m)]
+/// Returns the mean distances from which on tracks last, and are classified (m).
+fn means_m(approaches: &[Sightings]) -> [f64; 2] {
+    let mean_m = |distance_m: fn(&Sightings) -> f64| mean(&approaches.iter().map(distance_m).collect::<Vec<_>>());
+    [mean_m(|sightings| sightings.lasting_m), mean_m(|sightings| sightings.classified_m)]
+}
+
+/// Returns the ratio of the largest distance of a track to the mean distance from which on tracks
+/// last, and the share of the distances between with a track (-).
+fn intermittent(approaches: &[Sightings]) -> [f64; 2] {
+    let [lasting_m, _] = means_m(approaches);
+    let first_m = approaches.iter().fold(0.0, |first_m, sightings| sightings.first_m.max(first_m));
+    let (mut seen_m, mut between_m) = (0.0, 0.0);
+    for sightings in approaches {
+        seen_m += sightings.beyond_m;
+        between_m += first_m - sightings.lasting_m;
+    }
+    let share = if between_m > 0.0 { (seen_m / between_m).min(1.0) } else { 0.0 };
+    [rounded((first_m / lasting_m).max(1.0), 1e3), rounded(share, 1e3)]
 }
 
 impl<'a> Fitter<'a> {
@@ -149,16 +186,18 @@ impl<'a> Fitter<'a> {
 impl Fitter<'_> {
     fn case(class: VehicleClass, paint: f64, plate: Plate, visibility_m: f64) -> Case {
         let environment = Environment { visibility_m, ..Environment::CLEAR_DAY };
-        Case { class, paint, plate, environment, ..Case::usual() }
+        // The ratios of body shapes are ratios to this shape, with its own height.
+        let shape = BodyShape::of_class(class).first().copied();
+        Case { class, paint, plate, shape, environment, ..Case::usual() }
     }
 
-    /// Returns when the tracks are confirmed and classified in all approaches of a case.
-    fn firsts(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Firsts>, StudyError> {
-        let firsts = |run| {
-            firsts(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
+    /// Returns the gaps with a track in all approaches of a case.
+    fn sightings(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Sightings>, StudyError> {
+        let of_run = |run| {
+            sightings(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
-        (0..self.plan.approaches).into_par_iter().map(firsts).collect()
+        (0..self.plan.approaches).into_par_iter().map(of_run).collect()
     }
 
     /// Returns the distances that the object-level sensor with these errors needs to confirm a
@@ -167,8 +206,8 @@ impl Fitter<'_> {
         let file = with_settings(self.plan.file, &[format!("sensors.rear-object.range-m={TEST_RANGE_M:?}")])?;
         let sensors = file.concrete(&file.space().nominal())?.sensors.with_mode(SensorMode::Object);
         let sensors = sensors.without_range_fit(TEST_CLASS_RANGE_M).with_rear_errors(*errors);
-        let [confirmed_m, classified_m] = means_m(&self.firsts(&Case::usual(), &sensors)?);
-        Ok([TEST_RANGE_M - confirmed_m, TEST_CLASS_RANGE_M - classified_m])
+        let [lasting_m, classified_m] = means_m(&self.sightings(&Case::usual(), &sensors)?);
+        Ok([TEST_RANGE_M - lasting_m, TEST_CLASS_RANGE_M - classified_m])
     }
 
     /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's
@@ -187,19 +226,20 @@ impl Fitter<'_> {
             for paint in PAINTS {
                 let (mut row_m, mut class_row_m) = (Vec::new(), Vec::new());
                 for visibility_m in VISIBILITIES_M {
-                    let firsts = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
-                    let [centre_m, classified_m] = means_m(&firsts);
+                    let approaches = self.sightings(&Self::case(class, paint, plate, visibility_m), &self.full)?;
+                    let [centre_m, classified_m] = means_m(&approaches);
                     if class == VehicleClass::Car {
-                        squares += firsts
+                        squares += approaches
                             .iter()
-                            .map(|approach| maths::ln(approach.confirmed_m / centre_m).powi(2))
+                            .map(|approach| maths::ln(approach.lasting_m / centre_m).powi(2))
                             .sum::<f64>();
-                        count += firsts.len() as f64 - 1.0;
+                        count += approaches.len() as f64 - 1.0;
                     }
                     let range_m = rounded(centre_m + delay_m, 10.0);
                     // A class that the full chain knows at the confirmation of the track limits
                     // nothing.
-                    let is_known_at_once = firsts.iter().all(|approach| approach.classified_m == approach.confirmed_m);
+                    let is_known_at_once =
+                        approaches.iter().all(|approach| approach.classified_m == approach.lasting_m);
                     let class_range_m = rounded(classified_m + class_delay_m, 10.0).min(range_m);
                     row_m.push(range_m);
                     class_row_m.push(if is_known_at_once { range_m } else { class_range_m });
@@ -216,36 +256,47 @@ impl Fitter<'_> {
     /// class.
     fn shapes(&self) -> Result<ShapeRatios, StudyError> {
         let (mut range, mut class_range) = (BTreeMap::new(), BTreeMap::new());
+        let (mut intermittent_m, mut intermittent_share) = (BTreeMap::new(), BTreeMap::new());
         for class in VehicleClass::ALL {
-            let means_m = |shape: BodyShape| {
-                let means_at = |paint: f64, visibility_m: f64| {
+            let figures = |shape: BodyShape| {
+                let figures_at = |paint: f64, visibility_m: f64| {
                     let case = Case { shape: Some(shape), ..Self::case(class, paint, Plate::Clean, visibility_m) };
-                    self.firsts(&case, &self.full).map(|firsts| means_m(&firsts))
+                    let approaches = self.sightings(&case, &self.full)?;
+                    let ([lasting_m, classified_m], [ratio, share]) = (means_m(&approaches), intermittent(&approaches));
+                    Ok::<_, StudyError>([lasting_m, classified_m, ratio, share])
                 };
                 let row =
-                    |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| means_at(paint, *visibility_m)).collect();
-                SHAPE_PAINTS.into_iter().map(row).collect::<Result<Vec<Vec<[f64; 2]>>, StudyError>>()
+                    |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| figures_at(paint, *visibility_m)).collect();
+                SHAPE_PAINTS.into_iter().map(row).collect::<Result<Vec<Vec<[f64; 4]>>, StudyError>>()
             };
             let shapes = BodyShape::of_class(class);
-            let first_m = means_m(shapes[0])?;
-            for shape in &shapes[1..] {
-                let own_m = means_m(*shape)?;
-                let ratios = |figure: usize| -> Vec<Vec<f64>> {
-                    let row = |(shape, first): (&Vec<[f64; 2]>, &Vec<[f64; 2]>)| {
-                        shape
-                            .iter()
-                            .zip(first)
-                            .map(|(shape, first)| rounded(shape[figure] / first[figure], 1e3))
-                            .collect()
-                    };
-                    own_m.iter().zip(&first_m).map(row).collect()
+            let first_shape = figures(shapes[0])?;
+            for shape in shapes {
+                let own = figures(*shape)?;
+                let grid = |value: &dyn Fn(&[f64; 4], &[f64; 4]) -> f64| -> Vec<Vec<f64>> {
+                    let rows = own.iter().zip(&first_shape);
+                    rows.map(|(row, first_row)| {
+                        row.iter().zip(first_row).map(|(own, first)| rounded(value(own, first), 1e3)).collect()
+                    })
+                    .collect()
                 };
-                range.insert(shape.name().to_owned(), ratios(0));
-                class_range.insert(shape.name().to_owned(), ratios(1));
+                let name = || shape.name().to_owned();
+                if *shape != shapes[0] {
+                    range.insert(name(), grid(&|own, first| own[0] / first[0]));
+                    class_range.insert(name(), grid(&|own, first| own[1] / first[1]));
+                }
+                intermittent_m.insert(name(), grid(&|own, _| own[2]));
+                intermittent_share.insert(name(), grid(&|own, _| own[3]));
             }
         }
-        let extinctions_per_m = extinctions_per_m(&SHAPE_VISIBILITIES_M);
-        Ok(ShapeRatios { paints: SHAPE_PAINTS.to_vec(), extinctions_per_m, range, class_range })
+        Ok(ShapeRatios {
+            paints: SHAPE_PAINTS.to_vec(),
+            extinctions_per_m: extinctions_per_m(&SHAPE_VISIBILITIES_M),
+            range,
+            class_range,
+            intermittent: intermittent_m,
+            intermittent_share,
+        })
     }
 
     /// Returns the mean score of the true class, of each class.

@@ -99,3 +99,33 @@ fn a_forced_change_of_the_id_and_a_forced_false_track_are_counted() {
     let background = ClassScores([0.0, 0.0, 0.0, 1.0]);
     assert_eq!(with_class(background).false_tracks, 0);
 }
+
+/// Watches a vehicle that comes from 150 m to 5 m in steps of 0.5 m. It has a track between these
+/// gaps, and is classified from the last gap on (m).
+fn watched(tracks_m: &[[f64; 2]], classified_m: f64) -> Sightings {
+    let mut watch = Watch::new();
+    for step in 0..290 {
+        let gap_m = 150.0 - 0.5 * f64::from(step);
+        let is_tracked = tracks_m.iter().any(|[from_m, to_m]| gap_m <= *from_m && gap_m >= *to_m);
+        watch.observe(gap_m, is_tracked.then_some(gap_m <= classified_m));
+        if watch.is_settled(gap_m) {
+            break;
+        }
+    }
+    watch.sightings
+}
+
+#[test]
+fn a_track_that_is_lost_for_long_does_not_last() {
+    let expected = Sightings { first_m: 120.0, lasting_m: 87.0, classified_m: 87.0, beyond_m: 9.0 };
+    assert_eq!(watched(&[[120.0, 115.0], [107.0, 103.0], [87.0, 5.0]], 150.0), expected);
+    // A loss of 12 steps, here 6.5 m from track to track, does not count.
+    let lasting = Sightings { first_m: 90.0, lasting_m: 90.0, classified_m: 90.0, beyond_m: 0.0 };
+    assert_eq!(watched(&[[90.0, 86.5], [80.0, 5.0]], 150.0), lasting);
+    let longer = watched(&[[90.0, 86.5], [79.5, 5.0]], 150.0);
+    assert_eq!([longer.lasting_m, longer.beyond_m], [79.5, 3.5]);
+    // The class of a track that is lost again does not count either.
+    assert_eq!(watched(&[[120.0, 115.0], [67.0, 5.0]], 30.0).classified_m, 30.0);
+    // Never seen, or never again.
+    assert_eq!(watched(&[], 150.0), Sightings { first_m: 5.0, lasting_m: 5.0, classified_m: 5.0, beyond_m: 0.0 });
+}
