@@ -98,6 +98,11 @@ impl Section {
         matches!(self, Self::Scenarios | Self::Promise | Self::Twins | Self::Faults)
     }
 
+    /// Returns true if the figures rest on no runs with object-level sensors.
+    const fn is_full_alone(self) -> bool {
+        matches!(self, Self::Promise | Self::Twins)
+    }
+
     /// Returns the name on the command line.
     pub(crate) fn name(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
@@ -133,14 +138,16 @@ pub(crate) fn with_section(page: &str, section: Section, written: &str) -> Resul
     Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}\n\n{}\n\n{end}", written.trim_end()), 1))
 }
 
-/// Returns the outcomes that a section depends on, in a few digits: the outcomes of [`DIGESTS`],
-/// and with full sensors also the verdict of the headline that the README shows.
+/// Returns the outcomes that a section depends on, in a few digits: the outcomes of [`DIGESTS`]
+/// in the modes of its runs, and with full sensors also the verdict of the headline that the README
+/// shows.
 pub(crate) fn outcomes(section: Section) -> Result<String, Box<dyn Error>> {
     let digests: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(root().join(DIGESTS))?)?;
     let mut hasher = blake3::Hasher::new();
     let digests = digests["outcomes"].as_object().ok_or("no outcomes have digests")?;
     for (scenario, of_modes) in digests.iter().filter(|(scenario, _)| section.rests_on(scenario)) {
-        hasher.update(format!("{scenario} {of_modes}").as_bytes());
+        let shown = if section.is_full_alone() { &of_modes["ground-truth"] } else { of_modes };
+        hasher.update(format!("{scenario} {shown}").as_bytes());
     }
     if section.is_full() {
         let readme = std::fs::read_to_string(root().join("README.md"))?;
