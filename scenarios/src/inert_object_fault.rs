@@ -2,7 +2,7 @@
 
 use closecall_sensors::faults::{ObjectFaultConfig, OdometryErrorConfig};
 use closecall_sensors::{ObjectSensorModel, SensorMode, Sensors};
-use closecall_traffic::{ConfigError, Num, Parameters, Range, Road};
+use closecall_traffic::{Alignment, ConfigError, Num, Parameters, Range, Road};
 
 use super::inert_fault::{at, contradiction};
 use super::intervention::FaultConfig;
@@ -84,9 +84,10 @@ pub(super) fn refuse_of_map(
         return Err(located(error));
     }
     let [least_per_m, most_per_m] = road.curvature_range_per_m();
+    let curvatures_per_m = road.alignment().map_or(Road::CURVATURE_PER_M, |_| Alignment::CURVATURE_PER_M);
     let of_map = [
-        (&odometry.curvature_per_m, "curvature-per-m", least_per_m, Road::CURVATURE_PER_M),
-        (&odometry.curvature_per_m, "curvature-per-m", most_per_m, Road::CURVATURE_PER_M),
+        (&odometry.curvature_per_m, "curvature-per-m", least_per_m, curvatures_per_m),
+        (&odometry.curvature_per_m, "curvature-per-m", most_per_m, curvatures_per_m),
         (&odometry.lane_width_m, "lane-width-m", road.lane_width_m(), Road::LANE_WIDTH_M),
     ];
     for (num, key, actual, range) in of_map {
@@ -148,11 +149,11 @@ mod tests {
             ),
             // The curvature at the other end of the clothoid would stay in the range.
             (
-                "road.alignment = [{ s-m = 0.0, curvature-per-m = 0.0 }, { s-m = 500.0, curvature-per-m = -0.002 }]\n\
+                "road.alignment = [{ s-m = 0.0, curvature-per-m = 0.0 }, { s-m = 500.0, curvature-per-m = -0.0035 }]\n\
                  [fault.odometry]\ncurvature-per-m = -0.0006"
                     .to_owned(),
                 "fault.odometry.curvature-per-m",
-                "from -0.0025 to 0.0025",
+                "from -0.004 to 0.004",
             ),
         ] {
             let message = check(&keys).unwrap_err();

@@ -232,6 +232,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
             lane_width_m: rounded(approach.lane_width_m),
             curvature_per_m: Num::Fixed(0.0),
             alignment: Vec::new(),
+            alignment_d_m: None,
             speed_limit_mps: rounded(highest("cruise-mps") + highest("closing-mps")),
             overtaking_side: approach.direction(),
             guard_rails: false,

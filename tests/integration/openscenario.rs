@@ -910,7 +910,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("a=\"3.5\"", "", "needs `a`"),
         ("a=\"3.5\"", "a=\"wide\"", "`a` is `wide`"),
         ("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", "", "no `width`"),
-        ("a=\"3.5\"", "a=\"35\"", "`a` is 35; a lane"),
+        ("a=\"3.5\"", "a=\"35\"", "at 50 m it is 35; a lane"),
         ("a=\"3.5\"", "a=\"-3\"", "`width`: `a` is -3; a width has 0 to 100 m"),
         ("curvature=\"0.001\"", "curvature=\"1e9\"", "`arc`: `curvature` is beyond 0.2 1/m"),
         ("<road ", "<road id=\"1\"/><road ", "`road`: a road before it has the number `1` already"),
@@ -934,7 +934,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
             | "no `laneSection`"
             | "no lanes on the right"
             | "not a driving lane"
-            | "`a` is 35; a lane" => ROAD.replace(right, wrong),
+            | "at 50 m it is 35; a lane" => ROAD.replace(right, wrong),
             _ => ROAD.replacen(right, wrong, 1),
         };
         let refused = imported(&written(folder.path(), SCENARIO, &road), &output, &[]);
@@ -1097,6 +1097,148 @@ fn an_entity_bomb_is_refused_before_it_grows() {
     assert_eq!(code(&refused), 3);
     assert!(message(&refused).contains("200 levels"), "{}", message(&refused));
     assert!(!output.exists());
+}
+
+#[test]
+fn a_place_beyond_the_edge_of_a_lane_lies_in_the_lane_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // 3.3 m to the left of the centre of lane -2, which lies 5.25 m to the right of the edge.
+    let beside = SCENARIO.replace("ds=\"$Gap\" offset=\"0\"", "ds=\"$Gap\" offset=\"3.3\"");
+    assert_ne!(beside, SCENARIO);
+    stdout(&imported(&written(folder.path(), &beside, ROAD), &output, &[]), 0);
+    let scenario: toml::Table = toml::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
+    let truck = &scenario["actor"][1];
+    assert_eq!(truck["start"]["absolute"]["lane"].as_integer(), Some(1));
+    let [_, d_m] = numbers(&truck["path"][0])[..] else { panic!("{truck}") };
+    assert!((d_m + 1.95).abs() < 1e-9, "{d_m}");
+    fs::remove_file(&output).unwrap();
+    for (offset, reach) in [("5.3", "from -1.75 to 5.25 m beside it"), ("-1.8", "from -1.75 to 5.25 m beside it")] {
+        let wrong = beside.replace("\"3.3\"", &format!("\"{offset}\""));
+        let refused = imported(&written(folder.path(), &wrong, ROAD), &output, &[]);
+        assert_eq!(code(&refused), 3, "{offset}: {}", message(&refused));
+        assert!(message(&refused).contains(reach), "{offset}: {}", message(&refused));
+        assert!(!output.exists());
+    }
+}
+
+/// The road of an imported scenario.
+fn road_of(scenario: &Path) -> toml::Value {
+    toml::from_str::<toml::Table>(&fs::read_to_string(scenario).unwrap()).unwrap()["road"].clone()
+}
+
+/// Returns the road with a lane section from `at_m` on that has the lanes with these numbers.
+fn with_second_section(at_m: f64, lanes: &[i32]) -> String {
+    let width = "<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>";
+    let lane = |id: &i32| format!("<lane id=\"{id}\" type=\"driving\" level=\"false\">{width}</lane>");
+    let lanes: String = lanes.iter().map(lane).collect();
+    let section = format!("<laneSection s=\"{at_m}\"><right>{lanes}</right></laneSection></lanes>");
+    ROAD.replacen("</lanes>", &section, 1)
+}
+
+#[test]
+fn a_vehicle_drives_only_where_the_road_has_its_lane() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let of = |road: &str| imported(&written(folder.path(), SCENARIO, road), &output, &[]);
+    // The truck leaves lane -2 at 3 s, 170 m along the road.
+    let said = stdout(&of(&with_second_section(400.0, &[-1])), 0);
+    assert!(said.contains("lanes that begin or end: the lane section at 50 m gives the lanes"), "{said}");
+    assert_eq!(road_of(&output)["lanes"].as_integer(), Some(2));
+    json(&closecall(["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"]), 0);
+    // A lane that begins before the vehicles is there, and a section with the same lanes needs no note.
+    let begins = with_second_section(20.0, &[-1, -2, -3]);
+    let said = stdout(&of(&begins), 0);
+    assert!(said.contains("lanes that begin or end"), "{said}");
+    assert_eq!(road_of(&output)["lanes"].as_integer(), Some(3));
+    assert!(!stdout(&of(&with_second_section(400.0, &[-1, -2])), 0).contains("begin or end"));
+    fs::remove_file(&output).unwrap();
+    let renumbered = with_second_section(150.0, &[-1, -2, -3]).replacen(
+        "level=\"false\"><width",
+        "level=\"false\"><link><successor id=\"-2\"/></link><width",
+        1,
+    );
+    for (road, place, why) in [
+        (with_second_section(150.0, &[-1]), "case.xosc:", "`Slow_Truck` drives in lane -2 at 2.0"),
+        (with_second_section(80.0, &[-1]), "case.xosc:", "drives in lane -2 at 0.00 s, 110.0 m along the road"),
+        (with_second_section(400.0, &[-2]), "case.xosc:", "`Ego` drives in lane -1 at "),
+        (renumbered, "road.xodr:11: `successor`", "lane -1 goes on as lane -2"),
+    ] {
+        let refused = of(&road);
+        let said = message(&refused);
+        assert_eq!(code(&refused), 3, "{why}: {said}");
+        assert!(said.contains(place) && said.contains(why), "{why}: {said}");
+        assert!(!output.exists(), "{why}");
+    }
+}
+
+#[test]
+fn the_lanes_have_the_width_at_the_start_and_the_road_one_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let of = |road: &str| imported(&written(folder.path(), SCENARIO, road), &output, &[]);
+    // From 3.5 m to 3.25 m over 40 m.
+    let narrows = "<width sOffset=\"0\" a=\"3.5\" b=\"-0.00625\" c=\"0\" d=\"0\"/>\
+                   <width sOffset=\"40\" a=\"3.25\" b=\"0\" c=\"0\" d=\"0\"/>";
+    let road = ROAD.replace("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", narrows);
+    assert_ne!(road, ROAD);
+    let said = stdout(&of(&road), 0);
+    assert!(said.contains("lanes whose width changes: each has the width at 50 m"), "{said}");
+    assert!(!said.contains("lanes of other widths"), "{said}");
+    assert_eq!(road_of(&output)["lane-width-m"].as_float(), Some(3.25));
+
+    let speed = "<speed sOffset=\"0\" max=\"80\" unit=\"km/h\"/></lane>";
+    let said =
+        stdout(&of(&ROAD.replacen("</lane>\n          <lane id=\"-2\"", &format!("{speed}<lane id=\"-2\""), 1)), 0);
+    assert!(said.contains("the road has speed limits that change from place to place"), "{said}");
+    assert!((road_of(&output)["speed-limit-mps"].as_float().unwrap() - 120.0 / 3.6).abs() < 1e-9);
+    let offset = "<lanes><laneOffset s=\"0\" a=\"0\" b=\"0.01\" c=\"0\" d=\"0\"/>";
+    let said = stdout(&of(&ROAD.replacen("<lanes>", offset, 1)), 0);
+    assert!(said.contains("a lane offset that changes: the lanes have the offset at 50 m"), "{said}");
+    fs::remove_file(&output).unwrap();
+    for (wrong, word) in [
+        (road.replace("a=\"3.25\"", "a=\"2.25\""), "`width`: at 50 m it is 2.25; a lane of a scenario has a width of"),
+        (ROAD.replacen("</lane>", &speed.replace("80", "fast"), 2), "`speed`: `max` is `fast`"),
+    ] {
+        let refused = of(&wrong);
+        assert_eq!(code(&refused), 3, "{word}: {}", message(&refused));
+        assert!(message(&refused).contains(word), "{word}: {}", message(&refused));
+        assert!(!output.exists());
+    }
+}
+
+#[test]
+fn lanes_beside_the_reference_line_keep_their_distance_from_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let offset = "<lanes><laneOffset s=\"0\" a=\"-2.75\" b=\"0\" c=\"0\" d=\"0\"/>";
+    let road = ROAD.replacen("<lanes>", offset, 1).replacen("curvature=\"0.001\"", "curvature=\"0.004\"", 1);
+    let said = stdout(&imported(&written(folder.path(), SCENARIO, &road), &output, &[]), 0);
+    assert!(!said.contains("the road "), "{said}");
+    assert_eq!(alignment_of(&output), [[0.0, 0.004], [3_000.0, 0.004]]);
+    assert_eq!(road_of(&output)["alignment-d-m"].as_float(), Some(2.75));
+    json(&closecall(["run", output.to_str().unwrap(), "--sensors", "object", "--format", "json"]), 0);
+    // The road comes back from an export: the same line, and the same distance of the lanes.
+    let case = folder.path().join("case");
+    let words =
+        ["tool", "export", output.to_str().unwrap(), "--sensors", "ground-truth", "--form", "closed-loop", "-o"];
+    stdout(&closecall([&words[..], &[case.to_str().unwrap()]].concat()), 0);
+    let back = folder.path().join("back.toml");
+    stdout(&imported(&case.join("closed-loop.xosc"), &back, &[]), 0);
+    assert!(alignment_of(&back).iter().all(|[_, curvature_per_m]| (curvature_per_m - 0.004).abs() < 1e-12));
+    assert_eq!(road_of(&back)["alignment-d-m"].as_float(), Some(2.75));
+    // A tighter curve is said to be straight, as a reference line that is far away.
+    for (right, wrong, note) in [
+        (
+            "0.004",
+            "0.0041",
+            "a curvature of up to 0.0041 1/m, and a scenario has up to 0.004 1/m: the road is straight",
+        ),
+        ("-2.75", "-60", "a reference line 60 m beside its lanes, and -50 to 50 m are possible: the road is straight"),
+    ] {
+        let said = stdout(&imported(&written(folder.path(), SCENARIO, &road.replace(right, wrong)), &output, &[]), 0);
+        assert!(said.contains(note), "{said}");
+    }
 }
 
 /// The scenarios of others that are imported; all others are refused, each at a line and an

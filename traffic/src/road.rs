@@ -9,7 +9,8 @@
 //! ```
 //!
 //! The reference line is d = 0. Its curvature is positive if the road bends to the left. It is
-//! constant, or follows an [`Alignment`] of lines, arcs and clothoids.
+//! constant, or follows an [`Alignment`] of lines, arcs and clothoids. An alignment can lie beside
+//! d = 0: it then is the reference line, along which s is measured.
 //!
 //! One lane may be an acceleration lane: see [`AccelerationLane`].
 
@@ -107,6 +108,10 @@ pub struct RoadConfig {
     /// is a jump. Default: none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alignment: Vec<AlignmentPointConfig>,
+    /// Lateral position of the line of `alignment`, along which positions are measured (m): positive
+    /// to the left of the left edge. Default: the left edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alignment_d_m: Option<Num>,
     /// Speed limit (m/s).
     #[serde(default = "default_speed_limit")]
     pub speed_limit_mps: Num,
@@ -174,8 +179,16 @@ impl Check for RoadConfig {
                 let rule = "the curvature is constant, or has points between which it changes: one of both".to_owned();
                 return Err(ConfigError::new("curvature-per-m", Problem::Contradiction { other: "alignment", rule }));
             }
-            false => Course::Varying(OffsetLine { line: alignment::check(&self.alignment, parameters)?, d_m: 0.0 }),
+            false => {
+                let d_m = self.alignment_d_m.as_ref().map(|num| number(num, "alignment-d-m", Road::ALIGNMENT_D_M));
+                let line = alignment::check(&self.alignment, parameters)?;
+                Course::Varying(OffsetLine { line, d_m: d_m.transpose()?.unwrap_or(0.0) })
+            }
         };
+        if self.alignment_d_m.is_some() && self.alignment.is_empty() {
+            let rule = "it is the place of the alignment, and the road has none".to_owned();
+            return Err(ConfigError::new("alignment-d-m", Problem::Contradiction { other: "alignment", rule }));
+        }
         Ok(Road {
             lanes: self.lanes,
             lane_width_m: number(&self.lane_width_m, "lane-width-m", Road::LANE_WIDTH_M)?,
@@ -198,9 +211,13 @@ impl Check for RoadConfig {
 impl Road {
     /// Widths of a lane that the models cover (m).
     pub const LANE_WIDTH_M: Range = Range::closed(2.5, 5.0);
-    /// Curvatures that the models cover (1/m): 400 m is the smallest radius at which the
-    /// small-angle lane geometry still holds.
+    /// Curvatures of a road of one curvature that the models cover (1/m): 400 m is the smallest
+    /// radius at which the small-angle lane geometry still holds. An alignment has
+    /// [`Alignment::CURVATURE_PER_M`].
     pub const CURVATURE_PER_M: Range = Range::closed(-0.0025, 0.0025);
+    /// Lateral positions of an alignment (m): a reference line in the middle of a road with 8 lanes
+    /// per direction lies this far from their edge.
+    pub const ALIGNMENT_D_M: Range = Range::closed(-50.0, 50.0);
 
     /// Creates a straight road of `lanes` lanes (clamped to 1 to 8), each 3.75 m wide, with a speed
     /// limit of 36.1 m/s, overtaking on the left and no guard rails.
@@ -227,17 +244,24 @@ impl Road {
     /// Returns the same road with this alignment of its left edge.
     #[must_use]
     pub fn with_alignment(self, line: Alignment) -> Self {
-        Self { course: Course::Varying(OffsetLine { line, d_m: 0.0 }), ..self }
+        self.with_alignment_at(line, 0.0)
+    }
+
+    /// Returns the same road with an alignment at the lateral position `d_m`, which is clamped to
+    /// ±50 m.
+    #[must_use]
+    pub fn with_alignment_at(self, line: Alignment, d_m: f64) -> Self {
+        Self { course: Course::Varying(OffsetLine { line, d_m: d_m.clamp(-50.0, 50.0) }), ..self }
     }
 
     /// Returns the same road with another curvature by `added_per_m` (1/m) at each position. The
-    /// results are clamped to ±0.0025.
+    /// results are clamped to the range of a road of its kind.
     #[must_use]
     pub fn with_added_curvature(self, added_per_m: f64) -> Self {
         match self.course {
             Course::Constant(curvature_per_m) => self.with_curvature(curvature_per_m + added_per_m),
             Course::Varying(OffsetLine { line, d_m }) => {
-                let line = line.bent(|curvature_per_m| (curvature_per_m + added_per_m).clamp(-0.0025, 0.0025));
+                let line = line.bent(|curvature_per_m| (curvature_per_m + added_per_m).clamp(-0.004, 0.004));
                 Self { course: Course::Varying(OffsetLine { line, d_m }), ..self }
             }
         }
@@ -323,9 +347,9 @@ impl Road {
         self.course == Course::Constant(0.0)
     }
 
-    /// Returns the curvature of the line along which s is measured, the left edge, at `s_m` (1/m):
-    /// positive if the road bends to the left. On a [`reversed`](Self::reversed) road with an
-    /// alignment, this line is the right edge.
+    /// Returns the curvature of the line along which s is measured at `s_m` (1/m): positive if the road
+    /// bends to the left. The line is the left edge, or an alignment at
+    /// [`alignment_d_m`](Self::alignment_d_m).
     pub fn curvature_at_per_m(&self, s_m: f64) -> f64 {
         match &self.course {
             Course::Constant(curvature_per_m) => *curvature_per_m,
@@ -352,6 +376,13 @@ impl Road {
     /// Returns the alignment, or `None` on a road of one curvature.
     pub fn alignment(&self) -> Option<&Alignment> {
         self.varying().map(|course| &course.line)
+    }
+
+    /// Returns the lateral position of the line along which s is measured (m): 0 but for an alignment
+    /// beside the left edge. On a [`reversed`](Self::reversed) road with an alignment, an original of
+    /// 0 is the right edge.
+    pub fn alignment_d_m(&self) -> f64 {
+        self.varying().map_or(0.0, |course| course.d_m)
     }
 
     pub(crate) fn course(&self) -> &Course {
@@ -606,6 +637,7 @@ mod tests {
                 lane_width_m: default_lane_width(),
                 curvature_per_m: default_curvature(),
                 alignment: Vec::new(),
+                alignment_d_m: None,
                 speed_limit_mps: default_speed_limit(),
                 overtaking_side: Side::Left,
                 guard_rails: false,
@@ -626,7 +658,7 @@ mod tests {
 
     #[test]
     fn the_curvature_of_a_road_is_one_number_or_an_alignment() {
-        let check = |curvature_per_m: f64, points: &[[f64; 2]]| {
+        let check_at = |d_m: Option<f64>, curvature_per_m: f64, points: &[[f64; 2]]| {
             let point = |&[s_m, curvature_per_m]: &[f64; 2]| AlignmentPointConfig {
                 s_m: s_m.into(),
                 curvature_per_m: curvature_per_m.into(),
@@ -636,6 +668,7 @@ mod tests {
                 lane_width_m: default_lane_width(),
                 curvature_per_m: curvature_per_m.into(),
                 alignment: points.iter().map(point).collect(),
+                alignment_d_m: d_m.map(Num::Fixed),
                 speed_limit_mps: default_speed_limit(),
                 overtaking_side: Side::Left,
                 guard_rails: false,
@@ -644,16 +677,57 @@ mod tests {
             };
             config.check(&Parameters::default()).map_err(|error| error.to_string())
         };
+        let check = |curvature_per_m, points: &[[f64; 2]]| check_at(None, curvature_per_m, points);
         let points = [[0.0, 0.0], [100.0, 0.002]];
         let road = check(0.0, &points).unwrap();
         assert_eq!(road.alignment().unwrap().points().len(), 2);
         assert_eq!([50.0, 500.0].map(|s_m| road.curvature_at_per_m(s_m)), [0.001, 0.002]);
         let both = check(0.001, &points).unwrap_err();
         assert!(both.starts_with("`curvature-per-m` contradicts `alignment`"), "{both}");
-        let tight = check(0.0, &[[0.0, 0.0], [100.0, 0.003]]).unwrap_err();
-        assert!(tight.starts_with("`alignment[1].curvature-per-m` is 0.003"), "{tight}");
+        let tight = check(0.0, &[[0.0, 0.0], [100.0, 0.0041]]).unwrap_err();
+        assert!(tight.starts_with("`alignment[1].curvature-per-m` is 0.0041"), "{tight}");
+        assert!(check(0.004, &[]).unwrap_err().starts_with("`curvature-per-m` is 0.004"));
+        assert_eq!(road.alignment_d_m(), 0.0);
+        assert_eq!(check_at(Some(2.75), 0.0, &points).unwrap().alignment_d_m(), 2.75);
+        for d_m in [50.1, f64::NAN] {
+            let wrong = check_at(Some(d_m), 0.0, &points).unwrap_err();
+            assert!(wrong.starts_with("`alignment-d-m` is "), "{wrong}");
+        }
+        let alone = check_at(Some(2.75), 0.001, &[]).unwrap_err();
+        assert!(alone.starts_with("`alignment-d-m` contradicts `alignment`"), "{alone}");
         let one = check(0.0, &points[..1]).unwrap_err();
         assert!(one.starts_with("`alignment` is 1"), "{one}");
+    }
+
+    /// An arc beside the road is an arc at its left edge, whose radius is smaller or larger by the
+    /// distance.
+    #[test]
+    fn an_alignment_beside_the_left_edge_is_the_same_road_measured_along_another_line() {
+        for (curvature_per_m, at_m) in [(0.002, 2.75), (-0.002, 2.75), (0.0024, -6.0)] {
+            let points = [0.0, 100.0].map(|s_m| AlignmentPoint { s_m, curvature_per_m });
+            let beside = Road::straight(3).with_alignment_at(Alignment::new(&points).unwrap(), at_m);
+            let scale = 1.0 + curvature_per_m * at_m;
+            let arc = Road::straight(3).with_curvature(curvature_per_m / scale);
+            for (s_m, d_m) in [(-80.0, 0.0), (40.0, -9.4), (300.0, -1.9)] {
+                let (pose, expected) = (beside.plane_pose(s_m, d_m, 0.1), arc.plane_pose(s_m * scale, d_m, 0.1));
+                let away_m = maths::hypot(pose.x_m - expected.x_m, pose.y_m - expected.y_m);
+                assert!(away_m < 1e-9 && (pose.yaw_rad - expected.yaw_rad).abs() < 1e-12, "{pose:?} {expected:?}");
+                let [curvature, expected] =
+                    [(&beside, s_m), (&arc, s_m * scale)].map(|(road, s_m)| road.parallel_curvature_per_m(s_m, d_m));
+                assert!((curvature - expected).abs() < 1e-15, "{curvature} {expected}");
+                let path_m = beside.path_length_m([0.0, s_m], d_m) - arc.path_length_m([0.0, s_m * scale], d_m);
+                assert!(path_m.abs() < 1e-9, "{path_m}");
+                // The same holds in the opposite direction.
+                let [there, expected] = [(&beside, s_m), (&arc, s_m * scale)].map(|(road, s_m)| {
+                    let (s_m, d_m) = road.reversed_position_m(s_m, d_m);
+                    road.reversed().plane_pose(s_m, d_m, 0.0)
+                });
+                let away_m = maths::hypot(there.x_m - expected.x_m, there.y_m - expected.y_m);
+                assert!(away_m < 1e-9, "{there:?} {expected:?}");
+                let (back_s_m, back_d_m) = beside.road_position_m(pose.x_m, pose.y_m, s_m);
+                assert!((back_s_m - s_m).abs() < 1e-9 && (back_d_m - d_m).abs() < 1e-9, "{back_s_m} {back_d_m}");
+            }
+        }
     }
 
     #[test]

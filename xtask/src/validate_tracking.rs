@@ -75,6 +75,7 @@ fn road(guard_rails: bool) -> Road {
         lane_width_m: 3.75.into(),
         curvature_per_m: 0.0.into(),
         alignment: Vec::new(),
+        alignment_d_m: None,
         speed_limit_mps: 36.1.into(),
         overtaking_side: closecall_traffic::Side::Left,
         guard_rails,

@@ -13,8 +13,8 @@ use super::motion::Motion;
 use super::road::UsedRoad;
 use crate::date::today;
 
-/// Distance between the points of a bound (m). In the tightest curve, with a radius of 400 m, it
-/// deviates by 3 cm.
+/// Distance between the points of a bound (m). In the tightest curve, with a radius of 250 m, it
+/// deviates by 5 cm.
 const POINT_SPACING_M: f64 = 10.0;
 /// Number of the first dynamic obstacle. Lanelets have lower numbers, and each number is used once.
 const FIRST_OBSTACLE: usize = 1_000;

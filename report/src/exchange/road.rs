@@ -5,6 +5,8 @@
 //!  OpenDRIVE   t = 0 ─ reference line ─▶ s − s₀   lane −1, −2, … −n
 //! ```
 //!
+//! If the alignment lies beside the left edge, it is the reference line, and the lanes have an offset.
+//!
 //! An acceleration lane is lane −n, in three lane sections: with the full width, with a width that
 //! falls to 0, and without the lane. Before the lane begins, the marking to its left is solid. If
 //! traffic overtakes on the right, the acceleration lane is lane −1; the file has its full width
@@ -61,7 +63,12 @@ impl<'a> UsedRoad<'a> {
     fn element(&self, name: &str) -> Element {
         let speed = Element::new("speed").with("max", self.road.speed_limit_mps()).with("unit", "m/s");
         let sections = self.sections();
-        let mut lanes = Element::new("lanes");
+        let beside_m = self.road.alignment_d_m();
+        let offset = || {
+            let offset = Element::new("laneOffset").with("s", 0).with("a", -beside_m);
+            offset.with("b", 0).with("c", 0).with("d", 0)
+        };
+        let mut lanes = Element::new("lanes").children((beside_m != 0.0).then(offset));
         for (number, section) in sections.iter().enumerate() {
             let before = number.checked_sub(1).map(|number| &sections[number]);
             lanes = lanes.child(self.section(section, [before, sections.get(number + 1)]));
@@ -88,7 +95,7 @@ impl<'a> UsedRoad<'a> {
             }
         };
         let geometry = |piece: &AlignmentPiece| {
-            let start = self.road.plane_pose(piece.start_m, 0.0, 0.0);
+            let start = self.road.plane_pose(piece.start_m, self.road.alignment_d_m(), 0.0);
             let [from, to] = piece.curvatures_per_m;
             let shape = match (from == to, from == 0.0) {
                 (true, true) => Element::new("line"),
@@ -261,6 +268,13 @@ mod tests {
         }
         // A part within one piece is one piece.
         assert_eq!(count(&UsedRoad::new(&road, [2_000.0].into_iter()).document("road"), "<geometry"), 1);
+        // An alignment beside the left edge is the reference line, and the lanes have an offset.
+        assert_eq!(count(&text, "<laneOffset"), 0);
+        let beside = Road::straight(2).with_alignment_at(Alignment::new(&points).unwrap(), 2.75);
+        let text = document(&beside, 400.0);
+        assert_eq!(count(&text, "<laneOffset s=\"0\" a=\"-2.75\" b=\"0\" c=\"0\" d=\"0\"/>"), 1, "{text}");
+        let pose = beside.plane_pose(100.0, 2.75, 0.0);
+        assert_eq!(count(&text, &format!("x=\"{}\" y=\"{}\"", pose.x_m, pose.y_m)), 1, "{text}");
     }
 
     #[test]

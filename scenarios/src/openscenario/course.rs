@@ -8,7 +8,7 @@
 
 use std::path::Path;
 
-use closecall_traffic::{Alignment, AlignmentPoint, Road, maths};
+use closecall_traffic::{Alignment, AlignmentPoint, maths};
 
 use super::dom::{ImportError, Node};
 use super::road::number;
@@ -24,8 +24,6 @@ const STEPS: u32 = 16;
 /// few enough points remain.
 const LEAST_TOLERANCE_PER_M: f64 = 1e-7;
 const TOLERANCE_FACTOR: f64 = 1.5;
-/// Least distance of two points of an alignment (m).
-const LEAST_SPACING_M: f64 = 1.0;
 
 /// A point of the reference line of the file.
 #[derive(Clone, Copy, Debug)]
@@ -114,8 +112,12 @@ pub(super) fn alignment(
         start_m += length_m;
     }
     let most_per_m = samples.iter().map(|sample| sample.curvature_per_m.abs()).fold(0.0, f64::max);
-    if !samples.iter().all(|sample| Road::CURVATURE_PER_M.contains(sample.curvature_per_m)) {
-        return Ok(Err(format!("a curvature of up to {most_per_m:.4} 1/m, and a scenario has up to 0.0025 1/m")));
+    let range = Alignment::CURVATURE_PER_M;
+    if !samples.iter().all(|sample| range.contains(sample.curvature_per_m)) {
+        let allowed_per_m = range.high();
+        return Ok(Err(format!(
+            "a curvature of up to {most_per_m:.4} 1/m, and a scenario has up to {allowed_per_m} 1/m"
+        )));
     }
     let points = spaced(&samples);
     let mut tolerance_per_m = LEAST_TOLERANCE_PER_M;
@@ -209,7 +211,7 @@ fn spaced(samples: &[Sample]) -> Vec<AlignmentPoint> {
         let point = AlignmentPoint { s_m: sample.s_m, curvature_per_m: sample.curvature_per_m };
         let place = |back: usize| points.len().checked_sub(back).map(|index| points[index].s_m);
         match (place(2), place(1)) {
-            (_, Some(last_m)) if last_m < point.s_m && point.s_m < last_m + LEAST_SPACING_M => {}
+            (_, Some(last_m)) if last_m < point.s_m && point.s_m < last_m + Alignment::LEAST_SPACING_M => {}
             (Some(before_m), Some(last_m)) if before_m == point.s_m && last_m == point.s_m => {
                 points.pop();
                 points.push(point);

@@ -31,7 +31,7 @@ struct Stretch {
 }
 
 /// A lane section: where it begins (m), and its driving lanes.
-type Section<'a> = (f64, BTreeMap<i32, &'a Node>);
+pub(super) type Section<'a> = (f64, BTreeMap<i32, &'a Node>);
 
 /// Returns the acceleration lane of a road, or `None` if the lanes that begin or end are no such
 /// lane. `side` is the side of the reference line with the lanes along the road: `left` with
@@ -73,7 +73,8 @@ pub(super) fn find(lanes: &Node, side: &str, length_m: f64) -> Option<EntryLane>
     (ends && is_allowed).then_some(EntryLane { id, width_m: full.widths_m[0], positions })
 }
 
-fn section<'a>(node: &'a Node, side: &str) -> Option<Section<'a>> {
+/// Returns the driving lanes of a lane section on one side of the reference line.
+pub(super) fn section<'a>(node: &'a Node, side: &str) -> Option<Section<'a>> {
     let is_driving = |lane: &&Node| lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
     let mut lanes = BTreeMap::new();
     for lane in node.children.iter().filter(|child| child.name == side).flat_map(|child| &child.children) {

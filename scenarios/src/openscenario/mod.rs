@@ -24,6 +24,7 @@ mod plane;
 mod reader;
 mod replaced;
 mod road;
+mod sections;
 mod shape;
 mod shift;
 mod standard;
@@ -616,7 +617,11 @@ fn scenario_text(
                 format!("{{ s-m = {:?}, curvature-per-m = {:?} }}", point.s_m, point.curvature_per_m)
             };
             let points: Vec<String> = alignment.points().iter().map(point).collect();
-            format!("alignment = [{}]", points.join(", "))
+            let beside = match road.alignment_d_m == 0.0 {
+                true => String::new(),
+                false => format!(", alignment-d-m = {:?}", road.alignment_d_m),
+            };
+            format!("alignment = [{}]{beside}", points.join(", "))
         }
     };
     let _ = write!(

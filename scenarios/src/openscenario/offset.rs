@@ -19,6 +19,7 @@
 use std::f64::consts::PI;
 
 use super::dom::{ImportError, Node};
+use super::plane::nearest;
 use super::reader::is_true;
 use super::shift::Shift;
 use super::storyboard::{STEP_S, Storyboard};
@@ -45,6 +46,39 @@ impl Storyboard<'_> {
                 Err(self.reader.error(node, message))
             }
         }
+    }
+
+    /// Returns the lane in which a place beside the centre of a lane (m) lies, and its offset from the
+    /// centre of that lane (m).
+    ///
+    /// # Errors
+    /// [`ImportError`] if it lies beside the driving lanes.
+    pub(super) fn lane_beside(&self, node: &Node, lane: i32, offset_m: f64) -> Result<(i32, f64), ImportError> {
+        let most_m = 0.5 * self.road.lane_width_m;
+        if offset_m.abs() <= most_m {
+            return Ok((lane, offset_m));
+        }
+        let centres_m = &self.road.centres_m;
+        let index = self.road.lanes.iter().position(|other| *other == lane);
+        let Some(from_m) = index.and_then(|index| centres_m.get(index)).copied() else {
+            return Err(self.reader.error(node, "the road has no lane"));
+        };
+        let place_m = from_m + offset_m;
+        if let Some(index) = nearest(centres_m, place_m)
+            && (place_m - centres_m[index]).abs() <= most_m
+        {
+            return Ok((self.road.lanes[index], place_m - centres_m[index]));
+        }
+        let reach_m =
+            |(low, high): (f64, f64), centre_m: f64| (low.min(centre_m - most_m), high.max(centre_m + most_m));
+        let (low_m, high_m) = centres_m.iter().copied().fold((f64::INFINITY, f64::NEG_INFINITY), reach_m);
+        let message = format!(
+            "`offset` leads {offset_m} m beside the centre of lane {lane}; the driving lanes reach from {:.2} to {:.2} m \
+             beside it",
+            low_m - from_m,
+            high_m - from_m
+        );
+        Err(self.reader.error(node, message))
     }
 
     /// Returns the shift of a vehicle by an action that begins now.

@@ -11,6 +11,7 @@ use super::dom::{ImportError, Node, parse};
 use super::entry_lane;
 use super::plane::ReferenceLine;
 use super::reader::Reader;
+use super::sections::LaneSections;
 use super::shape;
 
 /// Names of the lane types on which vehicles drive.
@@ -38,8 +39,12 @@ pub(super) struct ImportedRoad {
     pub(super) centres_m: Vec<f64>,
     pub(super) lane_width_m: f64,
     pub(super) curvature_per_m: f64,
-    /// The course of a road whose curvature changes.
+    /// The course of a road whose curvature changes, or whose lanes lie beside its reference line.
     pub(super) alignment: Option<Alignment>,
+    /// Lateral position of the reference line of the file: to the left of the left edge of the lanes (m).
+    pub(super) alignment_d_m: f64,
+    /// Where along the road the lanes are.
+    pub(super) sections: LaneSections,
     pub(super) acceleration_lane: Option<AccelerationLane>,
     /// The reference line, or `None` if the road has another course than its reference line.
     pub(super) line: Option<ReferenceLine>,
@@ -95,7 +100,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     };
     let length_m = shape::check(path, road)?;
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
-    let Some(section) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
+    let Some(first) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
     let mut notes = Vec::new();
     // With left-hand traffic, the lanes along the road are those on the left.
     let is_left_hand = match road.raw("rule") {
@@ -105,23 +110,31 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     };
     let side = if is_left_hand { "left" } else { "right" };
     let entry = entry_lane::find(lanes, side, length_m);
-    if lanes.all("laneSection").count() > 1 && entry.is_none() {
-        notes.push("lanes that begin or end: the first section gives the lanes".to_owned());
+    let sections = LaneSections::read(path, lanes, side);
+    // The place that gives the lanes: the start of a vehicle, or of a road with an acceleration lane.
+    let (section, at_m) = match (used, &entry) {
+        (UsedRoad::Lane { reader, position, .. }, None) => {
+            let s_m = reader.number(position, "s")?;
+            (lanes.all("laneSection").nth(sections.at(s_m)).unwrap_or(first), s_m)
+        }
+        _ => (first, 0.0),
+    };
+    let within_m = (at_m - start_m(section)).max(0.0);
+    if sections.differ() && entry.is_none() {
+        notes.push(format!("lanes that begin or end: the lane section at {at_m} m gives the lanes"));
     }
     let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
     let mut driving: Vec<(i32, f64)> = Vec::new();
     for node in along.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
         let id = number(path, node, "id")?;
-        let (width_m, width) = match node.child("width") {
-            Some(width) => (number(path, width, "a")?, width),
-            None => return Err(node.error(path, "it has no `width`")),
-        };
+        let Some(width) = node.child("width") else { return Err(node.error(path, "it has no `width`")) };
+        number(path, width, "a")?;
+        let width_m = width_m(node, within_m);
         #[expect(clippy::cast_possible_truncation, reason = "a small whole number, as `shape::check` has checked")]
         let id = id as i32;
         let is_lane = matches!(used, UsedRoad::Lane { lane, .. } if *lane == id);
-        let is_used = is_lane && !Road::LANE_WIDTH_M.contains(width_m);
-        if !(width_m >= 0.0) || is_used {
-            let message = format!("`a` is {width_m}; a lane of a scenario has a width of 2.5 to 5 m");
+        if is_lane && !Road::LANE_WIDTH_M.contains(width_m) {
+            let message = format!("at {at_m} m it is {width_m}; a lane of a scenario has a width of 2.5 to 5 m");
             return Err(width.error(path, message));
         }
         if driving.iter().any(|(other, _)| *other == id) {
@@ -138,7 +151,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         UsedRoad::Lane { lane, .. } => driving.iter().find(|(id, _)| id == lane),
         UsedRoad::Only => driving.iter().find(|(_, width_m)| Road::LANE_WIDTH_M.contains(*width_m)),
     };
-    let Some(&(_, lane_width_m)) = used_lane else {
+    let Some(&(used_lane, lane_width_m)) = used_lane else {
         let lanes: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
         return Err(match used {
             UsedRoad::Lane { lane, reader, position, .. } => {
@@ -154,14 +167,16 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         return Err(along.error(path, message));
     }
     if along.all("lane").any(changes_width) {
-        notes.push("lanes whose width changes: each has the width of its start".to_owned());
+        notes.push(format!("lanes whose width changes: each has the width at {at_m} m"));
     }
     if driving.iter().any(|(_, width)| *width != lane_width_m) {
         notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
     }
-    let (curvature_per_m, alignment) = curvature(path, road, &mut notes)?;
-    let speed_limit_mps = road.at(&["type", "speed"]).map(|speed| speed_limit(path, speed)).transpose()?.flatten();
-    let mut centres_m = centres_m(lanes, along, &driving);
+    if changes(lanes, "laneOffset") {
+        notes.push(format!("a lane offset that changes: the lanes have the offset at {at_m} m"));
+    }
+    let speed_limit_mps = speed_limits(path, road, &mut notes)?;
+    let mut centres_m = centres_m(lanes, along, (&driving, [at_m, within_m]));
     if let (Some(entry), Some(width_m)) = (first_entry, last_width_m) {
         let to_centre_m = 0.5 * (width_m + entry.width_m);
         match (is_left_hand, centres_m.first().copied(), centres_m.last().copied()) {
@@ -170,6 +185,12 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
             _ => {}
         }
     }
+    // The lane of the ego keeps its place, also if other lanes have other widths.
+    let used_index = driving.iter().position(|lane| lane.0 == used_lane).unwrap_or_default();
+    let centre_m = centres_m.get(used_index).copied().unwrap_or_default();
+    let left_edge_m = centre_m + (used_index as f64 + 0.5) * lane_width_m;
+    let alignment_d_m = (-left_edge_m * 1e9).round() / 1e9 + 0.0;
+    let (curvature_per_m, alignment) = curvature(path, (road, alignment_d_m), &mut notes)?;
     let lanes = driving.into_iter().map(|(id, _)| id).collect();
     let line = reference_line(path, (road, length_m), curvature_per_m, alignment);
     let id = road_id.to_owned();
@@ -182,6 +203,8 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         lane_width_m,
         curvature_per_m,
         alignment,
+        alignment_d_m,
+        sections,
         acceleration_lane: entry.map(|entry| entry.positions),
         line,
         speed_limit_mps,
@@ -189,17 +212,41 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     })
 }
 
+/// Returns a number that `shape::check` has checked, or 0 if it is absent.
+fn value(node: &Node, name: &str) -> f64 {
+    node.raw(name).and_then(|text| text.trim().parse().ok()).unwrap_or(0.0)
+}
+
+/// Returns the position at which a lane section begins (m).
+fn start_m(section: &Node) -> f64 {
+    value(section, "s")
+}
+
+/// Returns the value at a place of the polynomials of a name (m), whose starts are the attribute `from`.
+fn polynomial_m(parent: &Node, (name, from): (&str, &str), at_m: f64) -> f64 {
+    let pieces: Vec<&Node> = parent.all(name).collect();
+    let last = pieces.iter().rev().find(|piece| value(piece, from) <= at_m).or(pieces.first());
+    last.map_or(0.0, |piece| {
+        let x = (at_m - value(piece, from)).max(0.0);
+        let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| value(piece, name));
+        a + x * (b + x * (c + x * d))
+    })
+}
+
+/// Returns the width of a lane at a distance from the start of its section (m).
+fn width_m(lane: &Node, within_m: f64) -> f64 {
+    polynomial_m(lane, ("width", "sOffset"), within_m).max(0.0)
+}
+
 /// Returns the centres of driving lanes to the left of the reference line (m), from the left.
-/// `along` holds the lanes of one side.
-fn centres_m(lanes: &Node, along: &Node, driving: &[(i32, f64)]) -> Vec<f64> {
-    let value = |node: &Node, name: &str| node.raw(name).and_then(|text| text.trim().parse::<f64>().ok());
-    let width_m = |lane: &Node| lane.child("width").and_then(|width| value(width, "a")).unwrap_or(0.0);
+/// `along` holds the lanes of one side. The place is given from the start of the road and of the section (m).
+fn centres_m(lanes: &Node, along: &Node, (driving, [at_m, within_m]): (&[(i32, f64)], [f64; 2])) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, reason = "as the lanes that they are compared with")]
-    let of_lane = |lane: &Node| Some((value(lane, "id")? as i32, width_m(lane)));
-    let mut widths: Vec<(i32, f64)> = along.all("lane").filter_map(of_lane).collect();
+    let of_lane = |lane: &Node| (value(lane, "id") as i32, width_m(lane, within_m));
+    let mut widths: Vec<(i32, f64)> = along.all("lane").map(of_lane).collect();
     // From the reference line outwards.
     widths.sort_by_key(|lane| lane.0.unsigned_abs());
-    let mut from_m = lanes.child("laneOffset").and_then(|offset| value(offset, "a")).unwrap_or(0.0);
+    let mut from_m = polynomial_m(lanes, ("laneOffset", "s"), at_m);
     let mut centres_m = Vec::new();
     for (id, width_m) in widths {
         let to_m = from_m + width_m * f64::from(id.signum());
@@ -239,9 +286,14 @@ fn reference_line(
     is_followed.then_some(ReferenceLine { x_m, y_m, heading_rad, length_m, course })
 }
 
-/// Returns the curvature of a road of lines or of one arc, or the alignment of a road with other pieces.
-/// If no alignment follows the road, returns the curvature of a straight road with a note.
-fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<(f64, Option<Alignment>), ImportError> {
+/// Returns the curvature of a road of lines, or of one arc at the edge of the lanes; or the alignment of a
+/// road with other pieces. The reference line lies `beside_m` to the left of the lanes. If no alignment
+/// follows the road, returns the curvature of a straight road with a note.
+fn curvature(
+    path: &Path,
+    (road, beside_m): (&Node, f64),
+    notes: &mut Vec<String>,
+) -> Result<(f64, Option<Alignment>), ImportError> {
     let plan = road.child("planView").ok_or_else(|| road.error(path, "it has no `planView`"))?;
     let shapes: Vec<&Node> = plan.all("geometry").filter_map(|geometry| geometry.children.first()).collect();
     if shapes.is_empty() {
@@ -249,13 +301,20 @@ fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<(f64, 
     }
     if let [arc] = &shapes[..]
         && arc.name == "arc"
+        && beside_m == 0.0
     {
         let curvature = number(path, arc, "curvature")?;
         if Road::CURVATURE_PER_M.contains(curvature) {
             return Ok((curvature, None));
         }
-        notes.push(format!("a curvature of {curvature} 1/m: the road is straight"));
-    } else if shapes.iter().any(|shape| shape.name != "line") {
+    }
+    if shapes.iter().any(|shape| shape.name != "line") {
+        let [low_m, high_m] = [Road::ALIGNMENT_D_M.low(), Road::ALIGNMENT_D_M.high()];
+        if !Road::ALIGNMENT_D_M.contains(beside_m) {
+            let allowed = format!("{low_m} to {high_m} m are possible");
+            notes.push(format!("a reference line {beside_m} m beside its lanes, and {allowed}: the road is straight"));
+            return Ok((0.0, None));
+        }
         match course::alignment(path, plan, notes)? {
             Ok(alignment) => return Ok((0.0, Some(alignment))),
             Err(reason) => notes.push(format!("{reason}: the road is straight")),
@@ -266,10 +325,29 @@ fn curvature(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<(f64, 
 
 /// Returns whether a driving lane does not have the same width everywhere.
 fn changes_width(lane: &Node) -> bool {
-    let number = |width: &Node, name: &str| width.raw(name).and_then(|text| text.trim().parse::<f64>().ok());
-    let is_sloped = |width: &Node| ["b", "c", "d"].iter().any(|name| number(width, name).unwrap_or(0.0) != 0.0);
     let is_driving = lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
-    is_driving && (lane.all("width").count() > 1 || lane.all("width").any(is_sloped))
+    is_driving && changes(lane, "width")
+}
+
+/// Returns whether the polynomials of a name do not have the same value everywhere.
+fn changes(parent: &Node, name: &str) -> bool {
+    let is_sloped = |piece: &Node| ["b", "c", "d"].iter().any(|name| value(piece, name) != 0.0);
+    let first = parent.child(name).map(|piece| value(piece, "a"));
+    parent.all(name).any(|piece| is_sloped(piece) || Some(value(piece, "a")) != first)
+}
+
+/// Returns the first speed limit of a road (m/s), with a note if it has others.
+fn speed_limits(path: &Path, road: &Node, notes: &mut Vec<String>) -> Result<Option<f64>, ImportError> {
+    let sections = road.all("lanes").flat_map(|lanes| lanes.all("laneSection"));
+    let lanes = sections.flat_map(|section| &section.children).flat_map(|side| side.all("lane"));
+    let driving = lanes.filter(|lane| lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind)));
+    let speeds = road.all("type").chain(driving).flat_map(|node| node.all("speed"));
+    let limits_mps = speeds.map(|node| speed_limit(path, node)).collect::<Result<Vec<_>, _>>()?;
+    if limits_mps.iter().any(|limit_mps| *limit_mps != limits_mps[0]) {
+        let rule = "the scenario has the first one, and the vehicles have the speeds of the storyboard";
+        notes.push(format!("speed limits that change from place to place: {rule}"));
+    }
+    Ok(limits_mps.first().copied().flatten())
 }
 
 /// Returns the speed limit (m/s), or `None` if there is none.

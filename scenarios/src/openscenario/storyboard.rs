@@ -180,6 +180,9 @@ impl<'a> Storyboard<'a> {
     /// Plays the storyboard to its end.
     pub(super) fn play(&mut self, storyboard: &Node) -> Result<(), ImportError> {
         self.collect_names(storyboard);
+        let road = self.road;
+        let sections = &road.sections;
+        let [mut first_section, mut last_section] = [usize::MAX, 0];
         let mut last_action_s = 0.0;
         loop {
             for act in storyboard.all("Story").flat_map(|story| story.all("Act")) {
@@ -191,7 +194,13 @@ impl<'a> Storyboard<'a> {
             for (index, vehicle) in self.vehicles.iter().enumerate() {
                 self.speeds[index].push((self.time_s, vehicle.speed_mps));
                 self.offsets[index].push([vehicle.travelled_m, vehicle.offset_m]);
+                let section = sections.at(vehicle.s_m);
+                if !sections.has(section, vehicle.lane) {
+                    return Err(self.no_lane(vehicle));
+                }
+                [first_section, last_section] = [first_section.min(section), last_section.max(section)];
             }
+            sections.check_numbers(first_section, last_section)?;
             let stop = storyboard.child("StopTrigger").filter(|trigger| !trigger.children.is_empty());
             let stops = stop.is_some() && self.is_triggered(stop)?;
             let limit_s = if stop.is_some() { LONGEST_S } else { last_action_s + AFTER_LAST_S };
@@ -205,6 +214,20 @@ impl<'a> Storyboard<'a> {
             }
             self.check_meetings()?;
             self.advance();
+        }
+    }
+
+    /// Returns the error of a vehicle whose lane is missing where it drives.
+    fn no_lane(&self, vehicle: &Vehicle) -> ImportError {
+        ImportError {
+            path: self.reader.path.clone(),
+            line: vehicle.line,
+            element: "ScenarioObject".to_owned(),
+            message: format!(
+                "`{}` drives in lane {} at {:.2} s, {:.1} m along the road, and the road has no such lane there: \
+                 it must change lanes before",
+                vehicle.name, vehicle.lane, self.time_s, vehicle.s_m
+            ),
         }
     }
 
@@ -913,7 +936,6 @@ impl<'a> Storyboard<'a> {
         if offset_m != 0.0 && vehicle == self.ego {
             return Err(reader.error(node, "`offset` must be 0: the ego starts at the centre of its lane"));
         }
-        self.check_offset(node, "offset", offset_m)?;
         if let Some(orientation) = node.child("Orientation") {
             let heading_rad = reader.number_or(orientation, "h", 0.0)?;
             if !(heading_rad.abs() < 1e-3) {
@@ -965,6 +987,7 @@ impl<'a> Storyboard<'a> {
             let is_relative = !matches!(node.name.as_str(), "LanePosition" | "WorldPosition");
             return if round == 0 && is_relative { Ok(()) } else { Err(reader.error(node, message)) };
         }
+        let (lane, offset_m) = self.lane_beside(node, lane, offset_m)?;
         let placed = &mut self.vehicles[vehicle];
         placed.start = (node.line, node.name.clone());
         (placed.s_m, placed.lane, placed.is_placed, placed.offset_m) = (s_m, lane, true, offset_m);

@@ -112,6 +112,7 @@ fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
         lane_width_m: Num::Fixed(rng.random_range(3.5..3.8)),
         curvature_per_m: Num::Fixed(if rng.random_bool(0.5) { rng.random_range(-0.001..0.001) } else { 0.0 }),
         alignment: Vec::new(),
+        alignment_d_m: None,
         speed_limit_mps: Num::Fixed(36.1),
         overtaking_side: Side::Left,
         guard_rails: rng.random_bool(0.5),

@@ -16,7 +16,7 @@ const RAIL_REACH_M: f64 = 160.0;
 /// Length behind the ego on which posts are modelled (m).
 const POST_REACH_M: f64 = 60.0;
 /// Length of the chords that approximate a curved rail (m). At the tightest curvature that a road
-/// may have, a chord is 4 cm off the arc.
+/// may have, a chord is 7 cm off the arc.
 const CHORD_M: f64 = 12.0;
 
 /// A solid, and the pose of its frame in the plane.

@@ -214,7 +214,7 @@ impl<'a> Run<'a> {
             time,
             odometry: odometry(&self.scenario, &self.world),
             road,
-            curvature_per_m: road.curvature_at_per_m(self.world.state(self.scenario.ego).s_m),
+            curvature_per_m: road.parallel_curvature_per_m(self.world.state(self.scenario.ego).s_m, 0.0),
             tracks: if self.looks_back { &self.tracks } else { &self.tracks_ahead },
             sensors: sensor_availability(self.perception.as_ref()),
         }

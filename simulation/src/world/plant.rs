@@ -262,7 +262,8 @@ impl Plant {
         let slip_rad = if slip_sin == 0.0 { slip_sin } else { maths::asin(slip_sin) };
         self.state.d_m = d_m;
         self.state.heading_rad = course_rad - slip_rad;
-        self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_at_per_m(self.state.s_m));
+        self.state.yaw_rate_radps =
+            self.state.speed_mps * (curvature_per_m + road.parallel_curvature_per_m(self.state.s_m, 0.0));
         // In a curve, a distance along the lane differs from the distance along the road's
         // reference line.
         self.state.s_m = road.advanced_m(self.state.s_m, d_m, along_m);

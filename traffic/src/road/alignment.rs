@@ -20,15 +20,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{PlanePose, Road};
+use super::PlanePose;
 use crate::{Check, ConfigError, Num, Parameters, Problem, Range, maths};
 
 /// Largest angle by which one step of the quadrature turns (rad).
 const STEP_RAD: f64 = 0.5;
-/// Least distance of two points of different positions (m). It bounds the rate of change of the
-/// curvature. Assumption: 1 to 20 are plausible. A clothoid of German motorways is A²/R long, which is
-/// 20 m or more at a radius of 400 m (FGSV 2008, RAA: A is 90 m or more).
-const LEAST_SPACING_M: f64 = 1.0;
 /// Step of the inverse below which it has converged (m), and its greatest number of steps.
 const CONVERGED_M: f64 = 1e-10;
 const MAX_STEPS: u8 = 60;
@@ -53,7 +49,7 @@ const GAUSS: [[f64; 2]; 4] = [
 pub struct AlignmentPointConfig {
     /// Position along the road (m).
     pub s_m: Num,
-    /// Curvature of the left edge there (1/m), positive if the road bends to the left.
+    /// Curvature of the line there (1/m), positive if the road bends to the left.
     pub curvature_per_m: Num,
 }
 
@@ -183,7 +179,7 @@ impl Check for AlignmentPointConfig {
     fn check(&self, parameters: &Parameters) -> Result<AlignmentPoint, ConfigError> {
         Ok(AlignmentPoint {
             s_m: parameters.number(&self.s_m, "s-m", Alignment::POSITION_M)?,
-            curvature_per_m: parameters.number(&self.curvature_per_m, "curvature-per-m", Road::CURVATURE_PER_M)?,
+            curvature_per_m: parameters.number(&self.curvature_per_m, "curvature-per-m", Alignment::CURVATURE_PER_M)?,
         })
     }
 }
@@ -193,6 +189,14 @@ impl Alignment {
     pub const MAX_POINTS: usize = 32;
     /// Positions of points (m).
     pub const POSITION_M: Range = Range::closed(-10_000.0, 100_000.0);
+    /// Curvatures (1/m): a radius of 250 m, the smallest one of the roads of ASAM's ALKS scenarios.
+    /// German motorways have 280 m or more (FGSV 2008, RAA, design class EKA 3). The poses are exact
+    /// at each radius; the sensors' pieces of a road are not.
+    pub const CURVATURE_PER_M: Range = Range::closed(-0.004, 0.004);
+    /// Least distance of two points of different positions (m). It bounds the rate of change of the
+    /// curvature. Assumption: 1 to 20 are plausible. A clothoid of German motorways is A²/R long,
+    /// which is 20 m or more at a radius of 400 m (FGSV 2008, RAA: A is 90 m or more).
+    pub const LEAST_SPACING_M: f64 = 1.0;
 
     /// Creates an alignment from points in the order of their positions.
     ///
@@ -209,10 +213,10 @@ impl Alignment {
         for (index, point) in points.iter().enumerate() {
             let at = |error: ConfigError| error.within_index(index).within("alignment");
             Self::POSITION_M.check(point.s_m, "s-m").map_err(at)?;
-            Road::CURVATURE_PER_M.check(point.curvature_per_m, "curvature-per-m").map_err(at)?;
+            Self::CURVATURE_PER_M.check(point.curvature_per_m, "curvature-per-m").map_err(at)?;
             let back_m = |steps: usize| index.checked_sub(steps).map(|before| point.s_m - points[before].s_m);
             let is_jump = back_m(1) == Some(0.0) && back_m(2) != Some(0.0);
-            if !(is_jump || back_m(1).is_none_or(|step_m| step_m >= LEAST_SPACING_M)) {
+            if !(is_jump || back_m(1).is_none_or(|step_m| step_m >= Self::LEAST_SPACING_M)) {
                 let rule = "positions increase by 1 m or more from point to point; two points at one position are \
                             a jump of the curvature"
                     .to_owned();

@@ -21,8 +21,8 @@ const FIRST_VEHICLE: u64 = 1;
 const FIRST_LANE: u64 = 10_001;
 /// Number of the left edge of the road; the lines between and beyond the lanes follow.
 const FIRST_BOUNDARY: u64 = 20_001;
-/// Distance between the points of a line (m). In the tightest curve, with a radius of 400 m, the
-/// line deviates by 3 cm.
+/// Distance between the points of a line (m). In the tightest curve, with a radius of 250 m, the
+/// line deviates by 5 cm.
 const POINT_SPACING_M: f64 = 10.0;
 /// Wheel radius (m): an assumption; 0.3 to 0.5 are plausible. No run depends on it.
 pub(super) const WHEEL_RADIUS_M: f64 = 0.325;

@@ -238,6 +238,7 @@ pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, Config
         lane_width_m: Num::Fixed(lane_width_m.clamp(LANE_WIDTH_RANGE_M[0], LANE_WIDTH_RANGE_M[1])),
         curvature_per_m: Num::Fixed(0.0),
         alignment: Vec::new(),
+        alignment_d_m: None,
         speed_limit_mps: Num::Fixed(SPEED_LIMIT_MPS),
         overtaking_side: Side::Left,
         guard_rails: false,

@@ -3,7 +3,7 @@
 //! The line has a knot every 8 m. Near a knot, the road is the arc with the curvature of the knot:
 //! the foot of a point is at most half a spacing away, where the arc deviates by κ'·h³/6 from a
 //! clothoid whose curvature changes by κ' per metre. This is below 3 mm for 2e-4 1/m², and below
-//! 2 cm at a jump from a line to an arc of the smallest radius.
+//! 3.2 cm at a jump from a line to an arc of the smallest radius, 250 m.
 
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{Road, VehicleState, maths};
@@ -114,7 +114,11 @@ mod tests {
 
     #[test]
     fn ground_beside_a_clothoid_has_the_coordinates_of_the_road_model() {
-        for road in [road(), road().reversed()] {
+        // A line beside the left edge, and the smallest radius.
+        let points = [[-150.0, 0.0], [-50.0, 0.004], [20.0, 0.004], [80.0, -0.002]];
+        let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
+        let beside = Road::straight(3).with_alignment_at(Alignment::new(&points).unwrap(), 2.75);
+        for road in [road(), road().reversed(), beside, beside.reversed()] {
             for lens_s_m in [-120.0, -20.0, 60.0, 150.0] {
                 let lens = VehicleState { s_m: lens_s_m, d_m: -5.6, ..VehicleState::default() };
                 let frame = EgoFrame::new(&road, &lens);

@@ -37,10 +37,13 @@ fn the_path_along_clothoids_is_the_line_of_the_ego_on_the_road() {
 }
 
 #[test]
-fn the_path_at_a_jump_of_the_curvature_is_within_three_millimetres() {
+fn the_path_at_a_jump_of_the_curvature_is_within_some_millimetres() {
     let state = VehicleState { s_m: 150.0, d_m: -5.6, ..VehicleState::default() };
     let [across_m, _] = errors(&alignment(&[[0.0, 0.0], [101.0, 0.0], [101.0, 0.0025], [200.0, 0.0025]]), &state);
     assert!(across_m < 3e-3, "{across_m}");
+    // At the smallest radius of an alignment, 250 m.
+    let [across_m, _] = errors(&alignment(&[[0.0, 0.0], [101.0, 0.0], [101.0, 0.004], [200.0, 0.004]]), &state);
+    assert!(across_m < 5e-3, "{across_m}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::Road;
 use crate::VehicleState;
 use crate::ego_frame::EgoFrame;
 
@@ -169,8 +170,8 @@ fn points_that_are_no_alignment_are_refused_by_their_key() {
         (vec![[0.0, 0.0]], "`alignment` is 1,"),
         (vec![[0.0, 0.0]; 33], "`alignment` is 33,"),
         (
-            vec![[0.0, 0.0], [100.0, 0.003]],
-            "`alignment[1].curvature-per-m` is 0.003, but a number from -0.0025 to 0.0025",
+            vec![[0.0, 0.0], [100.0, 0.0041]],
+            "`alignment[1].curvature-per-m` is 0.0041, but a number from -0.004 to 0.004",
         ),
         (vec![[0.0, 0.0], [100.0, f64::NAN]], "`alignment[1].curvature-per-m`"),
         (vec![[f64::NAN, 0.0], [100.0, 0.0]], "`alignment[0].s-m`"),
