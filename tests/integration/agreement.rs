@@ -189,6 +189,8 @@ fn verdict_of(part: &Path, records: &[Record], gates: &[String], out: &Path) -> 
     assert!(summary.starts_with(&format!("## Closecall: {word}")), "{context}");
     for reason in &reasons {
         let escaped = words_of_gate(reason).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+        // A number keeps its percent sign in its line.
+        let escaped = escaped.replace(" %", "\u{a0}%");
         assert!(page.contains(&escaped) && summary.contains(reason), "{context}: {reason}");
     }
     word.to_owned()

@@ -10,8 +10,7 @@ use std::path::Path;
 
 use closecall_traffic::{Alignment, AlignmentPoint, maths};
 
-use super::dom::{ImportError, Node};
-use super::road::number;
+use super::dom::{ImportError, Node, number};
 
 /// Largest distance between a point of the file's reference line and the imported line (m). An
 /// assumption: 0.05 to 0.5 are plausible, because the markings of a lane are 0.15 m wide.

@@ -210,6 +210,18 @@ fn node(start: &BytesStart<'_>, line: usize) -> Result<Node, String> {
     Ok(Node { name, line, attributes, ..Node::default() })
 }
 
+/// Returns the finite number in an attribute.
+///
+/// # Errors
+/// [`ImportError`] if the attribute is absent, or no finite number.
+pub(super) fn number(path: &Path, node: &Node, name: &str) -> Result<f64, ImportError> {
+    let Some(text) = node.raw(name) else { return Err(node.error(path, format!("it needs `{name}`"))) };
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(node.error(path, format!("`{name}` is `{text}`; a number is needed"))),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

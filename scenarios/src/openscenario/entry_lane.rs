@@ -6,7 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use closecall_traffic::AccelerationLane;
 
 use super::dom::Node;
-use super::road::DRIVING;
+
+/// Names of the lane types on which vehicles drive.
+pub(super) const DRIVING: [&str; 8] =
+    ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
 
 /// Width below which a lane has narrowed to nothing (m): numerical.
 const NO_WIDTH_M: f64 = 0.1;

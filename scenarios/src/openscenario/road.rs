@@ -7,16 +7,12 @@ use std::path::Path;
 use closecall_traffic::{AccelerationLane, Alignment, Road};
 
 use super::course;
-use super::dom::{ImportError, Node, parse};
-use super::entry_lane;
+use super::dom::{ImportError, Node, number, parse};
+use super::entry_lane::{self, DRIVING};
 use super::plane::ReferenceLine;
 use super::reader::Reader;
 use super::sections::LaneSections;
 use super::shape;
-
-/// Names of the lane types on which vehicles drive.
-pub(super) const DRIVING: [&str; 8] =
-    ["driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"];
 
 /// Numbers of lanes of a scenario file.
 const LANES: std::ops::RangeInclusive<usize> = 1..=8;
@@ -374,15 +370,6 @@ fn speed_limit(path: &Path, node: &Node) -> Result<Option<f64>, ImportError> {
         return Err(node.error(path, message));
     }
     Ok(Some(limit_mps))
-}
-
-/// Returns a finite number.
-pub(super) fn number(path: &Path, node: &Node, name: &str) -> Result<f64, ImportError> {
-    let Some(text) = node.raw(name) else { return Err(node.error(path, format!("it needs `{name}`"))) };
-    match text.trim().parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok(number),
-        _ => Err(node.error(path, format!("`{name}` is `{text}`; a number is needed"))),
-    }
 }
 
 #[cfg(test)]

@@ -9,8 +9,7 @@ use std::path::Path;
 
 use closecall_traffic::maths;
 
-use super::dom::{ImportError, Node};
-use super::road::number;
+use super::dom::{ImportError, Node, number};
 
 /// Largest curvature of a road (1/m): no car drives through less than 5 m of radius. An assumption; 0.1
 /// to 0.25 are plausible.

@@ -219,7 +219,7 @@ fn beyond_its_range_a_vehicle_is_seen_at_a_share_of_the_distances() {
     // and beyond; and the numbers of all steps.
     let counts = |share: f64, samples: u64| {
         let (fit, none) = (fit(share), Parameters::default());
-        let mut counts = [[0; 2]; 3];
+        let mut counts = [[0_u32; 2]; 3];
         for sample in 0..samples {
             let config = ObjectSensorConfig::default();
             let rear = config.check_rear_object(&none).unwrap().with_fit(fit);
@@ -228,10 +228,18 @@ fn beyond_its_range_a_vehicle_is_seen_at_a_share_of_the_distances() {
             while encounter.others[1].state.s_m < encounter.ego.state.s_m - 15.0 {
                 let gap_m = encounter.ego.state.s_m - encounter.others[1].state.s_m - 4.6;
                 let track = confirmed_track(perception.step(&encounter.scene()).unwrap(), Source::Rear);
-                let zone = usize::from(gap_m > 38.0) + usize::from(gap_m > 100.0);
-                counts[zone][0] +=
-                    u32::from(track.is_some_and(|track| track.existence >= 0.5 && track.class.is_vehicle()));
-                counts[zone][1] += 1;
+                // A track that is about to end at the range needs some measurements to exist again.
+                let zone = match gap_m {
+                    ..36.0 => Some(0),
+                    38.0..100.0 => Some(1),
+                    100.0.. => Some(2),
+                    _ => None,
+                };
+                if let Some(zone) = zone {
+                    counts[zone][0] +=
+                        u32::from(track.is_some_and(|track| track.existence >= 0.5 && track.class.is_vehicle()));
+                    counts[zone][1] += 1;
+                }
                 encounter.advance();
             }
         }
