@@ -1106,6 +1106,9 @@ fn a_place_beyond_the_edge_of_a_lane_lies_in_the_lane_beside_it() {
     // 3.3 m to the left of the centre of lane -2, which lies 5.25 m to the right of the edge.
     let beside = SCENARIO.replace("ds=\"$Gap\" offset=\"0\"", "ds=\"$Gap\" offset=\"3.3\"");
     assert_ne!(beside, SCENARIO);
+    // It starts in the ego's lane, and changes to the lane to its right.
+    let target = "RelativeTargetLane entityRef=\"Ego\" value=";
+    let beside = beside.replace(&format!("{target}\"0\""), &format!("{target}\"-1\""));
     stdout(&imported(&written(folder.path(), &beside, ROAD), &output, &[]), 0);
     let scenario: toml::Table = toml::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
     let truck = &scenario["actor"][1];

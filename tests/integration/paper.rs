@@ -28,7 +28,7 @@ fn check_figures(out: &Path, names: &[&str]) {
     }
     // The page has the style of every other page, in the dark, too. Each picture has a frame.
     assert!(page.contains("prefers-color-scheme: dark") && page.contains("name=\"viewport\""));
-    assert_eq!(page.matches("<figure>").count(), page.matches("<svg").count());
+    assert_eq!(page.matches("<figure class=\"broad\"").count(), page.matches("<svg").count());
 }
 
 #[test]
