@@ -11,9 +11,10 @@
 //!
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
 //! another format. The reader therefore infers the road from the traffic before it reads the rows;
-//! see `inferred_road`. It sorts rows in another order than that of the data set first. Lanelets that follow one another are one lane; see `stated_lanes`. A vehicle
-//! changes its lane where `laneChange` is 1, or where its offset from the lane's centre jumps. The
-//! offset also shows whether the positions are mirrored; see `orientation`.
+//! see `inferred_road`. It first sorts rows that are in another order than in the data set. Lanelets that
+//! follow one another are one lane; see `stated_lanes`. A vehicle changes its lane where `laneChange` is
+//! 1, or where its offset from the lane's centre jumps. The offset also shows whether the positions are
+//! mirrored; see `orientation`.
 //!
 //! **inD, rounD.** The columns of these data sets are the first columns of exiD. The data sets record
 //! intersections and roundabouts, where vehicles do not follow lanes. The reader gives a warning, and
@@ -124,7 +125,8 @@ impl ColumnIndices {
             lane_width_m: number(field(self.lane_width), "laneWidth", LANE_WIDTH_M).ok(),
             offset_m: self.offset_m(line, fields),
             is_flagged: flag.eq_ignore_ascii_case("true") || is_one(),
-            named_lane: self.named_lane(line, fields)?,
+            // The reading of the rows reports a wrong number.
+            named_lane: self.named_lane(line, fields).unwrap_or_default(),
         })
     }
 
