@@ -27,31 +27,32 @@ pub struct CoverageCounter {
 pub struct BinHits {
     /// The bin of each item.
     pub bins: Vec<String>,
-    /// The samples in it.
+    /// Number of samples in the bin.
     pub hits: u64,
-    /// Those of each arm in which the ego collides.
+    /// Number of these samples in which the ego collides, for each arm.
     pub collided: Vec<u64>,
-    /// Its probability, by the distributions of the scenario; `None` of a measure, an attribute or correlated parameters.
+    /// Probability of the bin by the distributions of the scenario; `None` for a measure, an
+    /// attribute or correlated parameters.
     pub weight: Option<f64>,
 }
 
 /// How an item or a cross is covered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CoverageResult {
-    /// Its name.
+    /// The name of the item or cross.
     pub name: CoverageName,
-    /// What its items bin: parameters, measures and attributes.
+    /// The parameters, measures and attributes that the items divide into bins.
     pub subjects: Vec<String>,
     /// Samples by which a bin is covered.
     pub at_least: u64,
-    /// The number of its bins that are covered.
+    /// Number of covered bins.
     pub covered: u64,
-    /// All of them that count, in the order of their items.
+    /// The bins that count, in the order of their items.
     pub bins: Vec<BinHits>,
-    /// Samples that are in none of them.
+    /// Number of samples that are in no bin.
     pub outside: u64,
-    /// Of the bins that the sampling design `coverage` visits in turn: the probability that the ego collides in each arm, given one
-    /// of the bins that were hit.
+    /// Probability that the ego collides in each arm, given one of the bins that were hit. Only the
+    /// bins that the sampling design `coverage` visits in turn have it.
     pub weighted_collision_rates: Option<Vec<f64>>,
 }
 
@@ -77,7 +78,8 @@ impl CoverageCounter {
         Self { work: Arc::clone(work), hits, collided, outside: vec![0; targets.len()] }
     }
 
-    /// Adds one sample: the run of the arm under test. A sample that ended in an error covers nothing.
+    /// Adds one sample: the run of the arm under test. A sample that ended in an error covers
+    /// nothing.
     pub fn push(&mut self, record: &Record) {
         let plan = self.work.file.coverage();
         let outcome = record.arms.last().and_then(|arm| arm.result.as_ref().ok());
@@ -103,8 +105,8 @@ impl CoverageCounter {
         (0..self.hits.len()).map(|place| self.result(place)).collect()
     }
 
-    /// Returns the share of an item or cross that is covered, and the number of samples in its bins; `None` if the scenario has
-    /// none of this name.
+    /// Returns the share of an item or cross that is covered, and the number of samples in its
+    /// bins; `None` if the scenario has no item or cross of this name.
     pub fn share(&self, name: &str) -> Option<(f64, u64)> {
         let plan = self.work.file.coverage();
         let place = plan.targets.iter().position(|target| target.name.as_str() == name)?;

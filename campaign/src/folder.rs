@@ -3,11 +3,11 @@
 //!
 //! ```text
 //!  manifest.json      how the campaign was made: everything that a replay needs
-//!  journal.jsonl      one record per sample, appended as results arrive (see the module `journal`)
-//!  ahead.jsonl        while a campaign runs: samples that wait for their turn (see the module `ahead`)
-//!  wall-times.jsonl   wall time of each sample; apart from the journal, since it differs from run to run
+//!  journal.jsonl      one record per sample, appended as results arrive (module `journal`)
+//!  ahead.jsonl        samples that wait for their turn while a campaign runs (module `ahead`)
+//!  wall-times.jsonl   wall time of each sample, which differs from run to run
 //!  lock               locked while a campaign runs
-//!  outcomes.parquet   made from the journal; byte-identical for any number of threads, parts and resumptions
+//!  outcomes.parquet   made from the journal: the same bytes, however the samples were shared out
 //!  timings.parquet    wall times as a table
 //!  junit.xml          one test case per sample and controller
 //!  report.html        report for human readers; summary.md: the same for a pull request
@@ -110,7 +110,7 @@ pub struct LockedFolder {
     _lock: Lock,
 }
 
-/// The files of a campaign that goes on, open for appending. See [`LockedFolder::resume`].
+/// The files of a resumed campaign, open for appending. See [`LockedFolder::resume`].
 #[derive(Debug)]
 pub struct ResumedFiles {
     /// The journal.
@@ -165,7 +165,7 @@ impl Folder {
                 return Err(FolderError::OtherCampaign { path: path.to_owned(), differences });
             }
             if grows {
-                // A seed that was known when the campaign began was known to all its samples.
+                // If the seed was known when the campaign began, the added samples know it, too.
                 let has_drawn_seed = there.has_drawn_seed && manifest.has_drawn_seed;
                 folder.write_manifest(&Manifest { has_drawn_seed, ..manifest.clone() })?;
             }
@@ -293,8 +293,8 @@ impl Folder {
         }
     }
 
-    /// Returns the records of the journal in their order. An unfinished last line is skipped, as a
-    /// killed program leaves it.
+    /// Returns the records of the journal in their order. Skips an unfinished last line, which a
+    /// killed program leaves.
     ///
     /// # Errors
     /// [`FolderError`] if the manifest cannot be read or the journal cannot be opened. An item of
@@ -318,7 +318,7 @@ impl Folder {
     }
 
     /// Checks that each record of the journal belongs to the plan of the manifest. A folder without
-    /// a journal has no record that does not.
+    /// a journal passes.
     ///
     /// # Errors
     /// [`FolderError`] as an item of [`Self::records`].

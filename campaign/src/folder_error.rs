@@ -38,7 +38,7 @@ pub enum FolderError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The folder already holds this campaign, and it is not to be resumed.
+    /// The folder already holds this campaign, and nobody asked to resume it.
     #[error(
         "failed to use {}: it already holds this campaign, and nothing is overwritten; resume it, name another folder, or delete this one",
         path.display()

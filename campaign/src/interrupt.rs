@@ -1,4 +1,4 @@
-//! Ctrl-C (SIGINT) and SIGTERM. No process of a controller is left when the program ends.
+//! The answer to Ctrl-C (SIGINT) and SIGTERM. No process of a controller outlives the program.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -45,9 +45,9 @@ fn state() -> MutexGuard<'static, State> {
 /// Starts the thread that receives the signals. `announce` is called with the first signal if it
 /// stops a campaign, `exit` with one that ends the program.
 pub fn watch(announce: fn(Signal), exit: fn(Signal)) {
-    // A file that grows beyond the limit of the user (`ulimit -f`) is then an error of its write.
+    // A write beyond the user's limit of file sizes (`ulimit -f`) is then an error, no signal.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
-    // Without the thread the signals end the program as the system does by default.
+    // Without the thread, a signal ends the program at once, as is the default of the system.
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     let body = move || {
         for number in signals.forever() {

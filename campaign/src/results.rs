@@ -5,13 +5,12 @@
 //!  closecall-results.previous   the last finished one before it
 //! ```
 //!
-//! A new campaign takes the place of the last one, whose folder becomes the previous one. A
-//! unfinished campaign becomes the previous one only if no finished one would
-//! make way for it: otherwise it is replaced itself. A folder
-//! is moved or removed only if its manifest says that a campaign has made it here on its own
-//! account, and if it holds only files of a campaign. Everything else at one of the two paths is
-//! refused and stays: a file, a symbolic link, a folder with other files, the folder of a campaign
-//! that the user has put there.
+//! A new campaign takes the place of the last one, whose folder becomes the previous one. If the
+//! last campaign is unfinished and the previous one is finished, the previous one stays, and the
+//! unfinished one is removed. A folder is moved or removed only if its manifest says that a
+//! campaign has made it here on its own account, and if it holds only files of a campaign.
+//! Everything else at one of the two paths is refused and stays: a file, a symbolic link, a folder
+//! with other files, the folder of a campaign that the user has put there.
 //!
 //! Two campaigns that start in one working folder at the same time do not meet: the lock of the
 //! folder at `closecall-results` also guards the previous one, and a folder is moved while its lock

@@ -17,16 +17,16 @@ use super::{ScenarioError, library};
 const PARAMETERS: &str = "parameters";
 /// The key that names the base.
 const BASE: &str = "base";
-/// What a scenario is judged by. It does not carry over from the base: another question needs its
-/// own answer.
+/// The keys by which a scenario is judged. They do not carry over from the base: another question
+/// needs its own answer.
 const JUDGED_BY: [&str; 3] = ["requirements", "checks", "gate"];
 
-/// Returns the text of the whole scenario: the text itself if it names no base.
+/// Returns the text of the whole scenario, or `None` if the text names no base.
 ///
 /// # Errors
-/// A message if the base is no scenario of the library.
+/// Returns a message if the library does not have the base.
 pub(super) fn expand(text: &str) -> Result<Option<String>, String> {
-    // Most files have no base, and a file that is not TOML is answered by the reader.
+    // Most files have no base, and the reader reports a file that is not TOML.
     if !text.contains(BASE) {
         return Ok(None);
     }
@@ -64,9 +64,9 @@ fn remove_unused(whole: &mut DocumentMut, file: &DocumentMut) {
     }
 }
 
-/// Returns the error of the whole text as an error of the text that names the base. Its line is the
-/// line with the same words there, or the line of the key `base` if the words are the base's. An
-/// error of another file, such as a pattern of a LiDAR, stays as it is.
+/// Turns an error in the whole text into an error in the text that names the base. Its line becomes
+/// the line of that text with the same words. If only the base has these words, it becomes the line
+/// of the key `base`. An error in another file, such as a pattern of a LiDAR, stays as it is.
 pub(super) fn located(error: ScenarioError, own: &Path, whole: &str, text: &str) -> ScenarioError {
     let line_of = |line: usize| {
         let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();

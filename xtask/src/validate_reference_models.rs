@@ -2,8 +2,8 @@
 //!
 //! Usage: `cargo run --release -p closecall-xtask -- validate-reference-models FILE.csv[.gz]`. The
 //! table has the columns of `docs/reference/controllers.md`; rows of models other than
-//! `CC_human_driver` and `FSM` are left out. Exit code 1 if fewer than 99 % of the cases of a model
-//! have the same outcome, or if the table has no case of a model.
+//! `CC_human_driver` and `FSM` are left out. The exit code is 1 if fewer than 99 % of the cases
+//! of a model have the same outcome, or if the table has no case of a model.
 
 use std::error::Error;
 use std::fs::File;

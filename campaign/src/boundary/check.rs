@@ -1,8 +1,8 @@
 //! The validity of a surface: each run predicted from the others.
 //!
-//! Runs near the boundary have an uncertain sign also if the surface is right. So the number of signs
-//! that are predicted is compared with the number that the surface expects. The first runs fill the
-//! rectangle, and most of their signs have to be predicted.
+//! Near the boundary the sign of a run is uncertain even if the surface is right. The number of
+//! signs that are predicted is therefore compared with the number that the surface expects. The
+//! first runs fill the rectangle, and most of their signs have to be predicted.
 
 use std::fmt;
 
@@ -12,10 +12,11 @@ use super::search::START_RUNS;
 use super::slices::Area;
 use super::surface::Predicted;
 
-/// Probability of so few predicted signs below which the surface is doubted: an assumption; 0.1 to 5 % are usual.
+/// Smallest probability of so few predicted signs with which the surface is not doubted: an
+/// assumption; 0.1 to 5 % are usual.
 const SMALLEST_PROBABILITY: f64 = 0.01;
-/// Share of the first runs whose sign has to be predicted: an assumption; 70 to 90 % are plausible. Half
-/// of the signs of noise are predicted.
+/// Share of the first runs whose sign has to be predicted: an assumption; 70 to 90 % are plausible.
+/// If the margin is noise, half of the signs are predicted.
 const SMALLEST_START_SHARE: f64 = 0.8;
 /// Share of the runs that may be without a value: an assumption; 5 to 25 % are plausible. A surface
 /// says nothing about places where the number does not exist, and draws a boundary through them.
@@ -30,7 +31,7 @@ pub struct LeaveOneOut {
     pub runs: usize,
     /// Runs that have the sign that is predicted without them.
     pub signs: usize,
-    /// The number that the surface expects.
+    /// Number of such runs that the surface expects.
     pub signs_expected: f64,
     /// Probability of so few signs if the surface is right.
     pub probability: f64,
@@ -144,9 +145,9 @@ pub(super) fn without_value(without: usize, runs: usize) -> Option<Doubt> {
 
 /// Returns the probability of at most `count` of independent events with these probabilities.
 ///
-/// That the signs of left-out runs are independent is an assumption. Neighbouring runs are predicted
-/// from each other, so that their errors go together, and the number of signs scatters more than
-/// here: the check doubts a right surface more often than [`SMALLEST_PROBABILITY`] says.
+/// The independence of the signs is an assumption. Neighbouring runs are predicted from each other,
+/// so their errors go together, and the number of signs scatters more than assumed. The check
+/// therefore doubts a right surface more often than [`SMALLEST_PROBABILITY`] says.
 fn at_most(count: usize, probabilities: &[f64]) -> f64 {
     let mut of_counts = vec![1.0];
     for probability in probabilities {

@@ -2,9 +2,9 @@
 //! its cost in speed.
 //!
 //! ```text
-//!  KEY = a, b, c  ┐
-//!  KEY = d, e     ├─▶ every combination ─▶ the same samples in every arm ─▶ prevented, induced, speed lost
-//!  …              ┘                                                          └─▶ Pareto-optimal combinations
+//!  KEY = a, b, c ┐
+//!  KEY = d, e    ├▶ every combination ▶ the same samples in every arm
+//!  …             ┘                      └▶ prevented, induced, speed lost ▶ Pareto-optimal ones
 //! ```
 //!
 //! All combinations run the same samples with the same random numbers. If all keys belong to the

@@ -1,4 +1,4 @@
-//! The text of a file.
+//! Writes the text of an OpenLABEL file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -18,7 +18,7 @@ use crate::trajectory_data::{LaneMarkings, WriteError};
 /// Number of ASAM's ontology in a file.
 const ONTOLOGY_UID: &str = "0";
 
-/// What the file says of itself.
+/// The comment in the header of the file.
 const COMMENT: &str = "Positions are the centres of vehicles: x along the road, y to the left of the left edge of lane 1, z up (m). \
     Cuboids are x, y, z, three angles (rad), length, width, height; the height is the typical one of the class. The names of numbers end \
     with their units.";
@@ -32,11 +32,11 @@ pub(super) struct Vehicle {
     pub(super) dimensions: Dimensions,
     pub(super) first: Time,
     pub(super) last: Time,
-    /// Its lanes, one after the other.
+    /// The lanes that the vehicle uses, in their order.
     pub(super) lanes: Vec<u8>,
 }
 
-/// What is known of the whole recording.
+/// Facts about the whole recording.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facts<'a> {
     pub(super) name: &'a str,
@@ -47,7 +47,7 @@ pub(super) struct Facts<'a> {
     pub(super) is_simulated: bool,
     /// Whether the recording states the lanes of its vehicles.
     pub(super) states_lanes: bool,
-    /// Whether it states their markings.
+    /// Whether the recording states the markings of the lanes.
     pub(super) states_markings: bool,
     pub(super) is_motorway: bool,
 }
@@ -78,7 +78,7 @@ struct LabelledChange<'a> {
 /// Writes a file.
 ///
 /// # Errors
-/// The file cannot be written, or two points of a track are in one frame.
+/// Fails if the file cannot be written, or if two points of a track are in one frame.
 pub(super) fn write(
     file: &mut (dyn Write + Send),
     facts: &Facts<'_>,
@@ -146,7 +146,7 @@ fn members<K: ToString, T: Serialize>(
     write!(file, "}}")
 }
 
-/// Returns what the recording makes certain of the road and its traffic.
+/// Returns the tags that the recording makes certain, about the road and its traffic.
 fn tags(facts: &Facts<'_>, vehicles: &[Vehicle]) -> Vec<Tag> {
     let tag = |kind, tag_data| Tag { kind, ontology_uid: ONTOLOGY_UID, tag_data };
     let vec = |kind, values| Some(Data { vec: vec![Named::of_tag(kind, values)], ..Data::default() });
@@ -308,7 +308,7 @@ fn add_metric(data: &mut Data, name: &str, metric: MetricResult) {
     }
 }
 
-/// Writes the frames, and returns the intervals without frames missing.
+/// Writes the frames. Returns the intervals in which no frame is missing.
 fn write_frames(
     file: &mut dyn Write,
     (frames, vehicles): (Frames, &[Vehicle]),

@@ -11,14 +11,14 @@
 //!
 //! **Road frame.** The files name lanelets, but the shapes of the lanelets are in a separate map of
 //! another format. The reader therefore infers the road from the traffic before it reads the rows;
-//! see `inferred_road`. It first sorts rows that are in another order than in the data set. Lanelets that
-//! follow one another are one lane; see `stated_lanes`. A vehicle changes its lane where `laneChange` is
-//! 1, or where its offset from the lane's centre jumps. The offset also shows whether the positions are
-//! mirrored; see `orientation`.
+//! see `inferred_road`. It first sorts rows that are in another order than in the data set.
+//! Lanelets that follow one another are one lane; see `stated_lanes`. A vehicle changes its lane
+//! where `laneChange` is 1, or where its offset from the lane's centre jumps. The offset also shows
+//! whether the positions are mirrored; see `orientation`.
 //!
-//! **inD, rounD.** The columns of these data sets are the first columns of exiD. The data sets record
-//! intersections and roundabouts, where vehicles do not follow lanes. The reader gives a warning, and
-//! refuses a file in which most vehicles follow no road.
+//! **inD, rounD.** The columns of these data sets are the first columns of exiD. The data sets
+//! record intersections and roundabouts, where vehicles do not follow lanes. The reader gives a
+//! warning, and refuses a file in which most vehicles follow no road.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
@@ -227,8 +227,8 @@ impl ExidColumns {
 /// reading of the rows reports them.
 ///
 /// # Errors
-/// Fails if the file cannot be read, no vehicle moves, the vehicles do not follow a road, or a file of more
-/// than [`WINDOW_ROWS`] rows is not sorted by vehicle.
+/// Fails if the file cannot be read, no vehicle moves, the vehicles do not follow a road, or a file
+/// of more than [`WINDOW_ROWS`] rows is not sorted by vehicle.
 pub(super) fn road_from_traffic(path: &Path, frame_rate_hz: f64) -> Result<InferredRoad, TrajectoryFileError> {
     let road = if is_sorted(path)? {
         InferredRoad::of(|visit| {
@@ -292,7 +292,7 @@ fn first_of(text: &str) -> &str {
 /// Calls `visit` with the line number and the content of each row that can be used.
 ///
 /// # Errors
-/// The file cannot be read, or the first error of `visit`.
+/// Fails if the file cannot be read, or with the first error of `visit`.
 fn each_plane_row(
     path: &Path,
     mut visit: impl FnMut(u64, &PlaneRow) -> Result<(), ReadError>,

@@ -76,7 +76,7 @@ fn frame(track: &Trajectory, point: &TrajectoryPoint, period: Time) -> Result<i6
 /// Checks the numbers of a point and the size of its vehicle.
 ///
 /// # Errors
-/// A number is not finite.
+/// Fails if a number is not finite.
 pub(crate) fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Result<(), WriteError> {
     let quantities = [
         ("the position along the road", point.s_m),

@@ -15,8 +15,8 @@ const fn sun(light: Light) -> (&'static str, f64) {
     }
 }
 
-/// Returns the action that sets the environment. Its friction is relative to the dry road of
-/// Closecall's default.
+/// Returns the action that sets the environment. The friction in it is relative to Closecall's
+/// default, a dry road.
 pub(super) fn action(config: &EnvironmentConfig, sample: &Environment, values: Values<'_>) -> Element {
     let (time, elevation_rad) = sun(sample.light);
     let friction = values.expression(&config.friction) / Environment::CLEAR_DAY.friction.into();

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use crate::run::film::EncounterMetrics;
 
-/// Inserts a value under `key`, or `null` and the reason for which it is absent.
+/// Inserts a value under `key`, or `null` and the reason why the value is absent.
 fn insert(object: &mut Map<String, Value>, key: &str, measured: Measured) {
     match measured {
         Ok(value) => {

@@ -34,7 +34,7 @@ pub enum MemberError {
         /// What is wrong, and what is allowed.
         message: String,
     },
-    /// A value cannot be right.
+    /// A value is not allowed.
     #[error("failed to check {}: `{key}`: {message}", path.display())]
     Value {
         /// The file.
@@ -54,11 +54,10 @@ pub enum MemberError {
         /// The name of both.
         name: String,
     },
-    /// There is no member of that name, no such file and no such folder, or the folder has no
-    /// member.
+    /// No member, file or folder has that name, or the folder has no member.
     #[error("{place}: expected a file or folder of members (*.toml), or one of {names}{suggestion}")]
     Unknown {
-        /// The place that is no member.
+        /// The name or path.
         place: String,
         /// The members that are part of the program.
         names: String,

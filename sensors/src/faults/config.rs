@@ -141,7 +141,7 @@ pub(super) fn either(a: f64, b: f64) -> f64 {
 impl Combine for LidarFault {
     fn and(self, other: Self) -> Self {
         Self {
-            // Of several entries, the entries of one sensor hold together.
+            // Only entries of the same sensor are combined; one of them may name the sensor.
             sensor: self.sensor.or(other.sensor),
             is_dead: self.is_dead || other.is_dead,
             is_frozen: self.is_frozen || other.is_frozen,

@@ -1,7 +1,7 @@
 //! The faults of the rear corner radars as a scenario file describes them.
 //!
-//! They are the faults of an object-level sensor that a sensor that delivers single detections can
-//! have. For their sources see [`ObjectFaultConfig`](super::ObjectFaultConfig).
+//! A rear radar has some of the faults of an object-level sensor.
+//! [`ObjectFaultConfig`](super::ObjectFaultConfig) states their sources.
 
 use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Range, Side};
 use schemars::JsonSchema;
@@ -14,7 +14,7 @@ use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 
 /// Azimuths of a blocked sector (deg): all directions.
 const AZIMUTH_DEG: Range = Range::closed(-180.0, 180.0);
-/// Share of the range that is left (-). A sensor without any is dead.
+/// Share of the range that is left (-). 0 is refused: a sensor without range has the fault `dead`.
 const RANGE_SHARE: Range = Range::above(0.0, 1.0);
 
 /// A fault of the rear radars. It holds from `from-s` to `until-s`, with all effects that it names.
@@ -111,7 +111,7 @@ impl RadarFault {
 impl Combine for RadarFault {
     fn and(self, other: Self) -> Self {
         Self {
-            // Of several entries, the entries of one radar hold together.
+            // Only entries of the same radar are combined; one of them may name the side.
             side: self.side.or(other.side),
             is_dead: self.is_dead || other.is_dead,
             dropout: either(self.dropout, other.dropout),
@@ -132,7 +132,7 @@ impl RadarFaultConfig {
         parameters: &Parameters,
     ) -> Result<FaultList<RadarFault>, ConfigError> {
         let list = FaultList::check(key, entries, |entry| entry.check(parameters))?;
-        // Entries of different radars do not add up.
+        // Each radar has sums of its own.
         for (index, sum) in
             [Side::Left, Side::Right].into_iter().flat_map(|side| list.of_side(side).combinations().collect::<Vec<_>>())
         {

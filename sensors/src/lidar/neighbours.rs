@@ -2,18 +2,18 @@
 //!
 //! ```text
 //!   ┌───┬───┬───┬───┐
-//!   │   │▒▒▒│▒▒▒│▒▒▒│    The neighbours of a point lie in at most nine cells (▒), whose sides are as long as the radius.
-//!   ├───┼───┼───┼───┤
-//!   │   │▒▒▒│▒•▒│▒▒▒│    The points are sorted by cell, column by column, so that each column is one run of points.
-//!   ├───┼───┼───┼───┤
+//!   │   │▒▒▒│▒▒▒│▒▒▒│    The neighbours of a point lie in at most nine cells (▒),
+//!   ├───┼───┼───┼───┤    whose sides are as long as the radius.
+//!   │   │▒▒▒│▒•▒│▒▒▒│    The points are sorted by cell, column by column,
+//!   ├───┼───┼───┼───┤    so that each column is one run of points.
 //!   │   │▒▒▒│▒▒▒│▒▒▒│
 //!   └───┴───┴───┴───┘
 //! ```
 //!
 //! The searches of `linfa-nn` differ at the edge of the radius. A k-d tree returns the points that
 //! lie exactly at the radius, while the linear search and the ball tree leave them out (version
-//! 0.8.1). This index returns them, as DBSCAN is defined (Ester et al. 1996) and as scikit-learn
-//! does it. `linfa-clustering` counts all points that the index returns.
+//! 0.8.1). This index returns them: the definition of DBSCAN does (Ester et al. 1996), and so does
+//! scikit-learn. `linfa-clustering` counts all points that the index returns.
 //!
 //! The index keeps the coordinates beside the views that `linfa-nn` requires. Distances between
 //! views would make the clustering slower by two fifths.
@@ -147,7 +147,7 @@ impl<'a, F: Float> Grid<'a, F> {
     }
 }
 
-/// Returns the coordinates of a point, 0 for one that it does not have.
+/// Returns the coordinates of a point; a missing one is 0.
 fn place<F: Float>(point: ArrayView1<'_, F>) -> [f64; 2] {
     [0, 1].map(|axis| point.get(axis).and_then(F::to_f64).unwrap_or(0.0))
 }

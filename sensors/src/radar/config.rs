@@ -2,8 +2,8 @@
 //! becomes.
 //!
 //! Sources of the default values:
-//! - Field of view and range: the rear mid-range radar of Bosch has an aperture of 150° and sees 90
-//!   m far (Bosch, press release *Mid-range radar enters series production for rear-end
+//! - Field of view and range: the rear mid-range radar of Bosch has an aperture of 150° and a range
+//!   of 90 m (Bosch, press release *Mid-range radar enters series production for rear-end
 //!   applications*, 2014).
 //! - Errors: the rear radar NB24G1V2 of Autoliv, as a lane change assistant, has ±0.5 m, ±2° and ±2
 //!   km/h (Autoliv ASP, *User's manual NB24G1V2*, FCC, page 5). The limits count as two standard
@@ -133,8 +133,8 @@ impl RearRadar {
         }
     }
 
-    /// Returns the left and the right radar of an ego of this length (m), as a perception program is
-    /// told of them.
+    /// Returns the left and the right radar of an ego of this length (m), in the form that a
+    /// perception program gets.
     pub fn mounts(&self, ego_length_m: f64) -> [RadarMount; 2] {
         [Side::Left, Side::Right].map(|side| {
             let Mount { at_m: [x_m, y_m], axis_rad, half_field_rad } = self.mount(side, ego_length_m);

@@ -2,17 +2,17 @@
 //!
 //! Rain attenuates the signal on its way to the vehicle and back. The specific attenuation is a
 //! power of the rain rate, γ = k·r^α (Recommendation ITU-R P.838-3, *Specific attenuation model for
-//! rain for use in prediction methods*, 2005, for 1 to 1,000 GHz). At 5, 25, 50 and 100 mm/h these
-//! are 3.6, 11, 18 and 30 dB/km.
+//! rain for use in prediction methods*, 2005, for 1 to 1,000 GHz). At 5, 25, 50 and 100 mm/h it is
+//! 3.6, 11, 18 and 30 dB/km.
 //!
 //! By the radar equation, the range R in rain is the distance at which the received power
 //! exp(−2βR)/R⁴ equals the power at the range R₀ in dry air, with β = γ·ln 10/10. It follows that
-//! ln R + βR/2 = ln R₀. The left side grows with R and is concave, so Newton's method approaches the
-//! solution from below if it starts below.
+//! ln R + βR/2 = ln R₀. The left side grows with R and is concave, so Newton's method approaches
+//! the solution from below if it starts below.
 //!
-//! **Neglected** is the backscatter of the drops, and with it false alarms: no source was found for
-//! their rate. Neglected are also spray, a film of water on the radome (the fault `range-share`),
-//! and fog, whose drops are small against the wavelength.
+//! The model neglects the backscatter of the drops, and with it false alarms: no source was found
+//! for their rate. It also neglects spray, a film of water on the radome (the fault `range-share`),
+//! and fog, whose drops are small compared with the wavelength.
 
 use closecall_traffic::maths;
 
@@ -25,7 +25,7 @@ const ALPHA: f64 = 0.712_5;
 /// that a scenario can have.
 const STEPS: usize = 10;
 
-/// Returns the specific attenuation of rain (1/m) of the power, one way.
+/// Returns the specific attenuation of the power by rain, one way (1/m).
 fn attenuation_per_m(rain_mm_per_h: f64) -> f64 {
     let db_per_km = K_DB_PER_KM * maths::powf(rain_mm_per_h, ALPHA);
     1e-3 * db_per_km * std::f64::consts::LN_10 / 10.0
@@ -52,7 +52,7 @@ mod tests {
     #[test]
     fn dry_air_leaves_the_range_and_rain_shortens_it_by_the_radar_equation() {
         assert_eq!(range_in_rain_m(90.0, 0.0), 90.0);
-        // By bisection of the radar equation in decibels, with the coefficients of the recommendation.
+        // By bisection of the radar equation in decibels, with the recommendation's coefficients.
         for (rain_mm_per_h, dry_m, range_m) in [
             (5.0, 90.0, 86.8556),
             (25.0, 90.0, 81.0705),

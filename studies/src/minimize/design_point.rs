@@ -8,37 +8,39 @@
 //!     └──────────────▶ z₁     4. without each coordinate that is not needed
 //! ```
 //!
-//! The distance of the design point to the origin is the reliability index β (A. M. Hasofer and N. C.
-//! Lind, *Exact and invariant second-moment code format*, Journal of the Engineering Mechanics
-//! Division, ASCE, 100 (1974) 111–121). It is usually found by the iteration of Hasofer, Lind,
-//! Rackwitz and Fiessler, which needs a limit state function that has a gradient. A simulation says
-//! only whether a point fails. So the iteration here differs: the normal of the boundary follows from
-//! the places at which rays beside the present one cross the boundary, and a step counts only if it
-//! leads to a failing point that is nearer. Where the boundary has an edge or a jump, such a step
-//! leads nowhere, and an evolution strategy of the kind (1 + λ) goes on (H.-G. Beyer and H.-P.
-//! Schwefel, *Evolution strategies: a comprehensive introduction*, Natural Computing 1 (2002) 3–52).
+//! The distance of the design point to the origin is the reliability index β (A. M. Hasofer and
+//! N. C. Lind, *Exact and invariant second-moment code format*, Journal of the Engineering
+//! Mechanics Division, ASCE, 100 (1974) 111–121). The usual search is the iteration of Hasofer,
+//! Lind, Rackwitz and Fiessler, which needs a limit state function that has a gradient. A run says
+//! only whether a point fails. The iteration here therefore estimates the normal of the
+//! boundary from the places at which rays beside the present one cross the boundary. A step counts
+//! only if it leads to a failing point that is nearer. Where the boundary has an edge or a jump, no
+//! such step is found, and an evolution strategy of the kind (1 + λ) goes on (H.-G. Beyer and
+//! H.-P. Schwefel, *Evolution strategies: a comprehensive introduction*, Natural Computing 1 (2002)
+//! 3–52).
 //!
-//! Every step ends with a point that has been run and that fails. What is returned is the nearest
-//! failing point that was tried. Nothing proves that there is none nearer.
+//! Every step ends with a point that has been run and that fails. The result is the nearest failing
+//! point that was tried. A nearer one may exist.
 
 use closecall_traffic::maths::{exp, ln};
 use closecall_traffic::{StandardNormal, Stream};
 use rand::RngExt;
 
-/// Number of points of a ray that are tried at once (-), and number of times that the part before the
-/// first failing one is divided again (-): together they resolve 1/729 of the distance.
+/// Number of points of a ray that are tried at once (-), and number of such rounds, each on the
+/// section before the first failing point (-): together they resolve 1/729 of the distance.
 const SECTIONS: usize = 8;
 const ROUNDS: usize = 3;
-/// Distance of the rays by which the normal is estimated from the present one (standard deviations):
-/// an assumption; 0.2 to 1 are plausible. A smaller one measures the resolution of the boundary.
+/// Distance from the present ray of the rays that estimate the normal (standard deviations): an
+/// assumption; 0.2 to 1 are plausible. A smaller one would measure the resolution of the boundary.
 const RAY_DISTANCE_SD: f64 = 0.5;
-/// Shares of the present distance between which such a ray is expected to cross the boundary (-), and
-/// number of bisections between them (-): assumptions. They resolve 1/256 of the distance.
+/// Shares of the present distance between which such a ray is expected to cross the boundary (-),
+/// and number of bisections between them (-): assumptions. They resolve 1/256 of the distance.
 const CROSSING: [f64; 2] = [0.5, 1.5];
 const BISECTIONS: usize = 8;
 /// Shares of the way to the point that the normal leads to (-).
 const WAYS: [f64; 4] = [1.0, 0.7, 0.4, 0.2];
-/// Shares by which a point has to be nearer than the present one (-), as the normal leads there.
+/// Shares by which the points that are tried in each of these directions are nearer than the
+/// present one (-).
 const NEARER: [f64; 6] = [0.3, 0.15, 0.07, 0.03, 0.01, 0.003];
 /// Number of points of a round that are drawn at random (-), and number of rounds without a nearer
 /// failing point after which the search ends (-): assumptions; 10 to 100 and 2 to 10 are plausible.
@@ -52,7 +54,7 @@ const SHARES: [f64; 2] = [0.002, 0.3];
 /// assumption; 0.001 to 0.02 are plausible.
 const PROGRESS: f64 = 0.005;
 
-/// Points whose failure can be asked for.
+/// Says which points fail, as long as its budget lasts.
 pub(super) trait Cases {
     /// Returns how many points can still be tried.
     fn affordable(&self) -> usize;
@@ -199,8 +201,8 @@ impl<'a, C: Cases> DesignPoint<'a, C> {
         Some(false)
     }
 
-    /// Sets coordinates to 0 as long as the point fails: first each of them alone, then those that
-    /// can be left out alone together, the largest first.
+    /// Sets coordinates to 0 as long as the point fails: first each coordinate alone, then, the
+    /// largest first, several of those together without which the point still fails.
     fn without_coordinates(&mut self) -> Option<bool> {
         let start = self.point.clone();
         let mut moved: Vec<usize> = (0..start.len()).filter(|index| start[*index] != 0.0).collect();
@@ -225,7 +227,7 @@ impl<'a, C: Cases> DesignPoint<'a, C> {
     /// Searches until a round of all steps comes no nearer, or no more points can be tried. Returns
     /// whether it ended because no step came nearer.
     pub(super) fn search(&mut self, rng: &mut Stream) -> bool {
-        // A step that cannot be paid for ends the search: the point is a failing one at any time.
+        // A step for which too few runs are left ends the search: the present point always fails.
         self.rounds(rng).is_some()
     }
 

@@ -43,7 +43,7 @@ const RATES: [f64; 3] = [0.02, 0.1, 0.3];
 /// A broken property.
 #[derive(Debug)]
 pub(super) enum Violation {
-    /// The journal files the outcome of another sample.
+    /// The journal has the outcome of another sample.
     OtherOutcome { sample: u64, arm: usize },
     /// A sample was run again after a crash, and its record does not say so.
     SilentRetry { arm: usize, sample: u64, crashes: u32, told: u32 },
@@ -305,7 +305,7 @@ impl Setup {
     }
 }
 
-/// How a run of the campaign goes.
+/// The course of one run of the campaign.
 #[derive(Clone, Copy)]
 struct Run {
     /// The number of new records after which the program is killed.
@@ -316,7 +316,7 @@ struct Run {
     rate: f64,
 }
 
-/// Runs no sample.
+/// A runner that refuses every sample.
 struct Refusing;
 
 impl crate::workers::SampleRunner for Refusing {

@@ -29,7 +29,7 @@ const LINE_WIDTH: f32 = 3.0;
 /// narrower one has no pixel in its full colour, and too little contrast.
 const THIN_LINE_WIDTH: f32 = 2.0;
 
-/// What a frame has, if it has it.
+/// Reads a value from a frame; `None` if the frame lacks it.
 type Of<T> = fn(&Frame) -> Option<T>;
 
 /// The role of a film among the films of a recording, which share the plots.
@@ -60,7 +60,7 @@ pub(super) const KINDS: [Kind; 7] =
     [Kind::Headway, Kind::Acceleration, Kind::Speed, Kind::Gap, Kind::Ttc, Kind::Margin, Kind::Encounter];
 
 impl Kind {
-    /// Returns the name of its entities.
+    /// Returns the name of the plot's entities.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Headway => "headway",
@@ -73,8 +73,8 @@ impl Kind {
         }
     }
 
-    /// Returns the title, which names the colours of the curves.
-    /// In recorded traffic the subject is the vehicle that changes lanes.
+    /// Returns the title, which names the colours of the curves. In recorded traffic the subject is
+    /// the vehicle that changes lanes.
     pub(super) const fn title(self, is_traffic: bool) -> &'static str {
         match self {
             Self::Acceleration if is_traffic => "Acceleration [m/s²] · subject blue",
@@ -203,8 +203,8 @@ impl Plots<'_> {
         Ok(true)
     }
 
-    /// Writes a curve about the vehicle that `vehicle` reads from the frames. It is interrupted where
-    /// another vehicle begins. Returns true if it has any value.
+    /// Writes a curve about the vehicle that `vehicle` reads from the frames. The curve is
+    /// interrupted where another vehicle begins. Returns true if it has any value.
     fn curve_about(
         &self,
         entity: &str,
@@ -426,8 +426,8 @@ impl Plots<'_> {
     }
 }
 
-/// Least share of a plot's height between two ticks of the value axis that have a number: 22 of the
-/// 85 px of the lowest plot.
+/// Least distance between two numbered ticks of the value axis, as a share of the plot's height: 22
+/// of the 85 px of the lowest plot.
 const LEAST_TICK_SHARE: f64 = 0.26;
 
 /// Steps between the ticks of a value axis: the viewer puts them at multiples of a power of ten.
@@ -497,7 +497,7 @@ mod tests {
         let row = |vehicle, value| (vehicle, Some(value));
         let of_two = [row(Some(2), 1.0), row(Some(2), 1.1), row(Some(3), 5.0), row(Some(3), 4.9)];
         assert_eq!(interrupted(of_two.into_iter()), [Some(1.0), Some(1.1), None, Some(4.9)]);
-        // A vehicle in the path is not yet in the lane, and a curve of one vehicle has no other gap.
+        // A vehicle in the path is not yet in the lane: a curve of one vehicle has no other gap.
         let of_one = [row(None, 3.0), row(Some(2), 2.9), (Some(2), None), row(Some(2), 2.7)];
         assert_eq!(interrupted(of_one.into_iter()), [Some(3.0), Some(2.9), None, Some(2.7)]);
     }
