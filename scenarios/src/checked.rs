@@ -472,7 +472,7 @@ mod tests {
 
     const RAMP: &str = "acceleration-lane = { from-m = 600.0, length-m = 250.0, taper-m = 60.0 }";
 
-    /// The ego at 30 m/s in this lane, and a vehicle on a road of three lanes, the rightmost of which
+    /// The ego at 30 m/s in this lane, and a vehicle. The road has three lanes, and the rightmost one
     /// is an acceleration lane.
     fn scenario(ego_lane: u8, start: &str, driver: &str, more: &str) -> Result<Scenario, String> {
         let text = format!(

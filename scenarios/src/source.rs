@@ -10,9 +10,10 @@
 //! | `FOLDER/NAME` | the same scenario of the library by its folder there, as `traffic/busy-overtake` |
 
 //!
-//! A folder may have TOML files of other kinds. `closecall.toml`, and a file with none of the keys `road`,
-//! `actor` and `base`, are no scenarios: they are skipped, and [`skipped`] names the latter. A file that
-//! is no valid TOML, or is empty, may be a scenario with a mistake.
+//! A folder may have TOML files of other kinds. `closecall.toml` is no scenario, and neither is a
+//! file with none of the keys `road`, `actor` and `base`. Both are skipped, and [`skipped`] names
+//! all but `closecall.toml`. A file that is no valid TOML, or is empty, may be a scenario with a
+//! mistake.
 
 use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};

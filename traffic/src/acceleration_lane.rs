@@ -67,8 +67,8 @@ impl AccelerationLane {
         ((self.taper_end_m - s_m) / (self.taper_end_m - self.to_m)).clamp(0.0, 1.0)
     }
 
-    /// Returns the stretches of a part of the road (m) on each of which the width changes linearly or
-    /// not at all.
+    /// Divides a part of the road into stretches (m), so that on each stretch the width changes
+    /// linearly or not at all. Returns the starts and ends.
     pub fn stretches_m(lane: Option<&Self>, [from_m, to_m]: [f64; 2]) -> Vec<[f64; 2]> {
         let ends_m = lane.map(|lane| [lane.to_m, lane.taper_end_m]).into_iter().flatten();
         let mut starts_m = vec![from_m];

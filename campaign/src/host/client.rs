@@ -100,7 +100,7 @@ pub(crate) fn run(work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmR
     CLIENT.with_borrow_mut(|client| client.run(work, arm, sample, limit))
 }
 
-/// Ends the worker processes that this thread has for a work, all samples of which are done.
+/// Ends the worker processes that this thread has for a work whose samples are all done.
 pub(crate) fn end(work: &Work) {
     CLIENT.with_borrow_mut(|client| client.end(work));
 }

@@ -220,8 +220,7 @@ mod tests {
         }
     }
 
-    /// What is expected of trucks whose width is known exactly, or of which nothing is known but the
-    /// height.
+    /// The expected size of trucks with these standard deviations of width and height.
     fn trucks(width_sigma_m: f64, height_sigma_m: f64) -> ExpectedSize {
         ExpectedSize { width_m: 2.55, width_sigma_m, height_sigma_m, ..ExpectedSize::of(VehicleClass::Truck) }
     }

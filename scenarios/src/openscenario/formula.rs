@@ -18,7 +18,7 @@ impl<'a> Values<'a> {
         Self { inner: BTreeMap::new(), outer: Some(outer) }
     }
 
-    /// Sets a value, and returns the former one of the same element.
+    /// Sets a value, and returns the earlier value of the same element.
     pub(super) fn insert(&mut self, name: String, value: String) -> Option<String> {
         self.inner.insert(name, value)
     }
