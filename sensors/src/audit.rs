@@ -45,8 +45,8 @@ pub struct TrackMatch {
     pub actor: usize,
     /// Distance between the nearest faces of the track and of the vehicle (m).
     pub distance_m: f64,
-    /// Errors of `[x, y, vx, vy]` of the nearest face (m, m/s): the errors whose NEES [`TrackAudit`]
-    /// computes.
+    /// Errors of `[x, y, vx, vy]` of the nearest face (m, m/s): the errors whose NEES
+    /// [`TrackAudit`] computes.
     pub error: [f64; 4],
 }
 

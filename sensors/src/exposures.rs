@@ -1,4 +1,5 @@
-//! The exposures of the rear camera in one run: the keys of their noise, and the faults of the camera.
+//! The exposures of the rear camera in one run: the keys of their noise, and the faults of the
+//! camera.
 
 use closecall_traffic::{Environment, Road, Stream, Time};
 
@@ -31,7 +32,8 @@ pub(crate) struct Exposures {
 /// The exposure of one scan.
 #[derive(Clone, Copy)]
 pub(crate) struct Exposure {
-    /// The key of the noise in the image. A frozen camera repeats the key of the image that it holds.
+    /// The key of the noise in the image. A frozen camera repeats the key of the image that it
+    /// holds.
     pub(crate) key: ExposureKey,
     /// The fault of the camera.
     pub(crate) fault: Option<CameraFault>,
@@ -50,8 +52,8 @@ impl Exposures {
         Self { keys: key.stream(CHANNEL), faults, held: None, failed_scans: 0 }
     }
 
-    /// Returns the exposure of a scan. Each scan draws a key, even if it needs no image: both arms of
-    /// a pair then get the same exposures.
+    /// Returns the exposure of a scan. Each scan draws a key, even if it needs no image: both arms
+    /// of a pair then get the same exposures.
     pub(crate) fn next_exposure(&mut self, scene: &Scene<'_>) -> Exposure {
         let key = ExposureKey::draw(&mut self.keys);
         let fault = self.faults.at(scene.time);

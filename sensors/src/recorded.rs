@@ -6,8 +6,8 @@
 //!             place of the ego on the road, from the recording
 //! ```
 //!
-//! It is the chain of mode `full` without its camera: boxes are classified by their shape alone. The
-//! same scans at the same places give the same bits as in the run that has recorded them.
+//! It is the chain of mode `full` without its camera: boxes are classified by their shape alone.
+//! The same scans at the same places give the same bits as in the run that has recorded them.
 
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{ActorId, Road, Time, Track, VehicleState};

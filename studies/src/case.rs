@@ -169,7 +169,8 @@ pub struct Case {
     pub sample: u64,
     /// The arm.
     pub arm: Arm,
-    /// Values of the parameters instead of those that the campaign draws, as a search has chosen them.
+    /// Values of the parameters instead of those that the campaign draws, as a search has chosen
+    /// them.
     pub parameters: Option<Parameters>,
     /// An arm in which the case must not fail.
     pub reference: Option<Arm>,

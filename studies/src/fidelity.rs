@@ -5,21 +5,23 @@
 //!  the same with fast sensors, samples 0 … N ────┴▶ estimate with a control variate
 //! ```
 //!
-//! Both campaigns have the same samples: the same parameters and random numbers. On the first n both modes are known, and their
-//! difference is averaged there. The other N − n samples of the fast mode say what its rate is. With the rate Y of the full chain and
-//! the rate X of the fast mode,
+//! Both campaigns have the same samples: the same parameters and random numbers. On the first n
+//! both modes are known, and their difference is averaged there. The other N − n samples of the
+//! fast mode say what its rate is. With the rate Y of the full chain and the rate X of the fast
+//! mode,
 //!
 //! ```text
 //!  estimate = Ȳₙ − β·(X̄ₙ − X̄ₘ),   β = cov(X, Y)/var(X) · m/(n + m),   m = N − n
 //! ```
 //!
-//! has the least variance of all β. Covariance and variances are estimated from the samples; nothing is assumed of how well the modes
-//! agree. If they do not agree at all, β is about 0 and the estimate is the estimate of the full chain. (Control variates: Lemieux, *Monte
-//! Carlo and Quasi-Monte Carlo Sampling*, 2009, section 4.1; with a mean that is estimated itself: Schmeiser, Taaffe and Wang,
-//! *Biased control-variate estimation*, 2001.)
+//! has the least variance of all β. Covariance and variances are estimated from the samples;
+//! nothing is assumed of how well the modes agree. If they do not agree at all, β is about 0 and
+//! the estimate is the estimate of the full chain. (Control variates: Lemieux, *Monte Carlo and
+//! Quasi-Monte Carlo Sampling*, 2009, section 4.1; with a mean that is estimated itself: Schmeiser,
+//! Taaffe and Wang, *Biased control-variate estimation*, 2001.)
 //!
-//! The fast campaign is one of its own, or lies in the folder of the first one ([`FAST_SAMPLES`]): then
-//! the folder also has the [`Fidelity`] of both.
+//! The fast campaign is one of its own, or lies in the folder of the first one ([`FAST_SAMPLES`]):
+//! then the folder also has the [`Fidelity`] of both.
 //!
 //! [`FAST_SAMPLES`]: closecall_campaign::folder::FAST_SAMPLES
 
@@ -41,8 +43,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Coverage of the intervals.
 const COVERAGE: f64 = 0.95;
-/// Fewest samples of the full chain with an event, and without it, for an interval that rests on a nearly normal mean: an assumption;
-/// 5 to 30 are plausible. The exact interval of the full chain needs none.
+/// Fewest samples of the full chain with an event, and without it, for an interval that rests on a
+/// nearly normal mean: an assumption; 5 to 30 are plausible. The exact interval of the full chain
+/// needs none.
 const FEWEST_EVENTS: u64 = 10;
 
 /// A rate of the full chain, from its own runs and with the fast ones.
@@ -60,7 +63,8 @@ pub struct FidelityRate {
     pub fast: f64,
     /// The correlation of both modes; `None` if one of them does not vary.
     pub correlation: Option<f64>,
-    /// The rate of the full chain with the fast runs, and its 95 % interval; `None` of too few events.
+    /// The rate of the full chain with the fast runs, and its 95 % interval; `None` of too few
+    /// events.
     pub estimate: Option<FidelityEstimate>,
 }
 
@@ -219,7 +223,8 @@ pub enum FidelityError {
 /// Returns the rates of every scenario of two campaigns.
 ///
 /// # Errors
-/// [`FidelityError`] if a folder cannot be read, or the campaigns are not two fidelities of the same samples.
+/// [`FidelityError`] if a folder cannot be read, or the campaigns are not two fidelities of the
+/// same samples.
 pub fn fidelity(full: &SavedCampaign, fast: &SavedCampaign) -> Result<Vec<FidelityReport>, FidelityError> {
     check(full, fast)?;
     let (of_full, of_fast) = (events(full)?, events(fast)?);
@@ -319,7 +324,8 @@ fn of_record(record: &Record) -> Option<Vec<bool>> {
     Some(events)
 }
 
-/// Returns the rate of pairs of values of the full chain and of the fast mode, and more of the fast mode; `None` without a pair.
+/// Returns the rate of pairs of values of the full chain and of the fast mode, and more of the fast
+/// mode; `None` without a pair.
 fn rate(name: &str, pairs: &[[f64; 2]], more: &[f64]) -> Option<FidelityRate> {
     let (n, m) = (pairs.len() as f64, more.len() as f64);
     if pairs.len() < 3 || more.is_empty() {
@@ -366,8 +372,8 @@ mod tests {
 
     use super::*;
 
-    /// Draws a rate of the full chain of 0.08 and a fast mode that tells the same in a share `agree` of the samples, else something of
-    /// its own.
+    /// Draws a rate of the full chain of 0.08 and a fast mode that tells the same in a share
+    /// `agree` of the samples, else something of its own.
     fn repetition(number: u64, agree: f64) -> FidelityRate {
         const N: usize = 600;
         let mut rng = stream(7, number, &ActorId::new("test").unwrap(), "fidelity");

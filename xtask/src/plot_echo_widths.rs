@@ -1,5 +1,5 @@
-//! Draws the echo pulse widths that the model of the SCALA 2 predicts, beside the published widths of
-//! a LiDAR of the same maker.
+//! Draws the echo pulse widths that the model of the SCALA 2 predicts, beside the published widths
+//! of a LiDAR of the same maker.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- plot-echo-widths docs/evidence/echo-width.svg

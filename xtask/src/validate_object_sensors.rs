@@ -32,8 +32,8 @@ const CONDITIONS: [(&str, &[&str]); 4] = [
 const MIN_KAPPA: f64 = 0.8;
 const MAX_DIFFERENCE: f64 = 0.02;
 
-/// Difference of the rear gaps at the engagement up to which the modes engage alike (m): the goal of
-/// the requirement.
+/// Difference of the rear gaps at the engagement up to which the modes engage alike (m): the goal
+/// of the requirement.
 const NEAR_M: f64 = 5.0;
 
 /// Compares the object-level sensors with the full chain.
@@ -59,8 +59,8 @@ pub(crate) struct Args {
     /// The fit of the object-level sensor, in place of the one that is built in
     #[arg(long)]
     fit: Option<PathBuf>,
-    /// Also write each sample as a row of this CSV file: appearance of the rear vehicle, and gap and
-    /// time of the engagement
+    /// Also write each sample as a row of this CSV file: appearance of the rear vehicle, and gap
+    /// and time of the engagement
     #[arg(long)]
     rows: Option<PathBuf>,
 }

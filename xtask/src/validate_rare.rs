@@ -1,14 +1,19 @@
-//! Measures how often the intervals of the methods for rare events cover, and how many runs they need, on functions of known probability and on a scenario.
+//! Measures how often the intervals of the methods for rare events cover, and how many runs they
+//! need, on functions of known probability and on a scenario.
 //!
 //! ```sh
 //! cargo run --release -p closecall-xtask -- validate-statistics rare 1000
 //! ```
 //!
-//! Each method estimates each probability in the given number of repetitions (default: 1,000), each with its own seed, on a function with one region of
-//! failure, on one with two, and on one whose score leads away from the second region. A method that finds one region only would cover in no repetition.
-//! One repetition in fifty of the first function's also runs on `tests/fixtures/known-rare-probability.toml`, through all of a campaign. The validation fails
-//! (exit code 1) if an interval covers in less than 93 % or in more than 97 % of the repetitions, or if importance sampling needs more runs for a relative width
-//! of 0.5 than 1/10, 1/50 and 1/500 of plain sampling at 1e-3, 1e-5 and 1e-6. Subset simulation has to save as much at 1e-5 and 1e-6; at 1e-3 it saves nothing.
+//! Each method estimates each probability in the given number of repetitions (default: 1,000), each
+//! with its own seed, on a function with one region of failure, on one with two, and on one whose
+//! score leads away from the second region. A method that finds one region only would cover in no
+//! repetition. One repetition in fifty of the first function's also runs on
+//! `tests/fixtures/known-rare-probability.toml`, through all of a campaign. The validation fails
+//! (exit code 1) if an interval covers in less than 93 % or in more than 97 % of the repetitions,
+//! or if importance sampling needs more runs for a relative width of 0.5 than 1/10, 1/50 and 1/500
+//! of plain sampling at 1e-3, 1e-5 and 1e-6. Subset simulation has to save as much at 1e-5 and
+//! 1e-6; at 1e-3 it saves nothing.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -190,7 +195,8 @@ pub(crate) fn validate(repetitions: u64) -> Result<bool, Box<dyn std::error::Err
                 print(&format!("{method}, {regions:?}, {probability:e}: {}\n", total.line(probability)))?;
                 let asks_for_saving = method == Method::Importance || probability < 1e-4;
                 let saves = !asks_for_saving || total.saving(probability) >= saving;
-                // Subset simulation follows the score, and promises nothing of a region that the score hides.
+                // Subset simulation follows the score, and promises nothing of a region that the
+                // score hides.
                 let is_promised = method == Method::Importance || !matches!(regions, Regions::Hidden);
                 let covers = (COVERED[0]..=COVERED[1]).contains(&total.coverage());
                 is_right &= !is_promised || saves && covers;

@@ -161,11 +161,12 @@ impl Classifier {
         Ok(Self { session, planes: vec![0.0; SAMPLES * CHANNELS], name: SHIPPED_FILE.to_owned() })
     }
 
-    /// Loads the network of a file, or the one that ships with Closecall, and evaluates a black crop.
+    /// Loads the network of a file, or the one that ships with Closecall, and evaluates a black
+    /// crop.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] with the path if the file cannot be read, or if its network has
-    /// another input, or another output than four probabilities.
+    /// Returns a [`ClassifierError`] with the path if the file cannot be read, or if its network
+    /// has another input, or another output than four probabilities.
     pub fn of(file: Option<&str>, backend: &Backend) -> Result<Self, ClassifierError> {
         let Some(path) = file else { return Self::shipped(backend) };
         let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };

@@ -133,10 +133,10 @@ impl Ground {
 
     /// Returns the road coordinates (s, d) (m) of the point (x, y) of the ground frame.
     ///
-    /// The reference line is a circle of curvature κ that touches the X axis. Then
-    /// d = −q/(1 + √(1 + κ·q)) for q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0. The arc length
-    /// s follows from X/(1 − κ·Y) to third order, which suffices because it only positions dashes
-    /// and textures.
+    /// The reference line is a circle of curvature κ that touches the X axis. Then d = −q/(1 +
+    /// √(1 + κ·q)) for q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0. The arc length s follows
+    /// from X/(1 − κ·Y) to third order, which suffices because it only positions dashes and
+    /// textures.
     fn road_position(&self, x: f32, y: f32) -> (f32, f32) {
         let along = self.cos * x - self.sin * y;
         let across = self.d_m + self.sin * x + self.cos * y;

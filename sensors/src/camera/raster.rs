@@ -222,8 +222,8 @@ fn snap([x, y, z]: Vec3, Projection { focal_px, middle_px, optics }: Projection<
     [to_grid(middle_px[0], x), to_grid(middle_px[1], y)]
 }
 
-/// Appends a triangle whose corners lie in front of the near plane (m), unless it faces away from the
-/// lens.
+/// Appends a triangle whose corners lie in front of the near plane (m), unless it faces away from
+/// the lens.
 fn append(corners_m: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
     let mut corners = corners_m.map(|corner| snap(corner, projection));
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
@@ -244,8 +244,8 @@ fn append(corners_m: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face:
     out.push(ScreenTriangle { edges, bounds: [low(0), high(0), low(1), high(1)], inverse_depth, face });
 }
 
-/// Returns the edge function from `a` to `b`, which is positive to the right of the edge. A sample on
-/// the edge belongs to the triangle below or to the right of it (the top-left rule).
+/// Returns the edge function from `a` to `b`, which is positive to the right of the edge. A sample
+/// on the edge belongs to the triangle below or to the right of it (the top-left rule).
 fn edge(a: [i32; 2], b: [i32; 2]) -> [i64; 3] {
     let [dx, dy] = [0, 1].map(|axis| i64::from(b[axis]) - i64::from(a[axis]));
     let is_top_left = dy < 0 || (dy == 0 && dx > 0);

@@ -63,8 +63,8 @@ pub struct PerceptionQuestion<'a> {
     pub time: Time,
     /// The scans that have arrived. None if all sensors whose scans were due are silent.
     pub scans: &'a [OutsideScan],
-    /// The scans of the rear radars that have arrived since the last question, in the order of their
-    /// times for each radar.
+    /// The scans of the rear radars that have arrived since the last question, in the order of
+    /// their times for each radar.
     pub radar_scans: &'a [OutsideRadarScan],
     /// The image of the rear camera, if one is due and the program gets images.
     pub image: Option<&'a OutsideImage>,

@@ -28,8 +28,8 @@ pub(crate) struct Outside {
 }
 
 impl Outside {
-    /// Creates the program of a run, whose LiDARs and radars that look back are these, in their order.
-    /// `latency_s` is the time from a scan to the tracks that a controller gets of it (s).
+    /// Creates the program of a run, whose LiDARs and radars that look back are these, in their
+    /// order. `latency_s` is the time from a scan to the tracks that a controller gets of it (s).
     pub(crate) fn new(
         program: Box<dyn PerceptionProgram>,
         (lidars, radar): (Vec<Lidar>, Option<RearRadar>),

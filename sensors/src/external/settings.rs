@@ -34,7 +34,8 @@ impl ProgramKind {
         }
     }
 
-    /// Splits a value of `perception` into the kind and what follows the colon; `None` if it names no program.
+    /// Splits a value of `perception` into the kind and what follows the colon; `None` if it names
+    /// no program.
     pub fn split(perception: &str) -> Option<(Self, &str)> {
         let (word, rest) = perception.split_once(':')?;
         let kind = Self::ALL.into_iter().find(|kind| kind.prefix() == word)?;

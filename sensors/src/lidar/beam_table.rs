@@ -1,5 +1,5 @@
-//! The pattern of a LiDAR that does not scan a raster, as a table of the directions and times of its
-//! beams.
+//! The pattern of a LiDAR that does not scan a raster, as a table of the directions and times of
+//! its beams.
 //!
 //! ```text
 //!   azimuth_deg,elevation_deg,time_offset_us        azimuth: to the sensor's left as it looks, about its axis
@@ -185,8 +185,8 @@ impl BeamTable {
         [low, self.azimuths_deg.len() - high]
     }
 
-    /// Returns the mean time of the beams near an azimuth after the beginning of the scan (s). Where
-    /// there are none, returns the mean time of all beams.
+    /// Returns the mean time of the beams near an azimuth after the beginning of the scan (s).
+    /// Where there are none, returns the mean time of all beams.
     pub(super) fn mean_offset_s(&self, azimuth_deg: f64) -> f64 {
         let end = |limit_deg: f64| self.azimuths_deg.partition_point(|beam_deg| *beam_deg < limit_deg);
         let near = end(azimuth_deg - NEIGHBOURHOOD_DEG)..end(azimuth_deg + NEIGHBOURHOOD_DEG);

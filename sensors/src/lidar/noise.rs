@@ -87,7 +87,8 @@ impl Noise {
         z ^ (z >> 31)
     }
 
-    /// Returns a number that is uniform in the open interval from 0 to 1, at least [`LEAST_UNIFORM`].
+    /// Returns a number that is uniform in the open interval from 0 to 1, at least
+    /// [`LEAST_UNIFORM`].
     #[inline(always)]
     pub(crate) fn uniform(self, beam: usize, purpose: Purpose) -> f32 {
         ((self.bits(beam, purpose) >> 41) as u32 as f32 + 0.5) * (1.0 / 8_388_608.0)

@@ -1,5 +1,5 @@
-//! Parts of a face that determine the middle of a vehicle whose edges are not seen: the plate, and a
-//! pair of headlamps.
+//! Parts of a face that determine the middle of a vehicle whose edges are not seen: the plate, and
+//! a pair of headlamps.
 //!
 //! ```text
 //!      ┌───────────────────────┐      A vehicle with dark paint, or one in fog, returns light from these parts alone. The plate is

@@ -76,8 +76,8 @@ impl LinkBudget {
         (strong * strong + weak * weak).sqrt()
     }
 
-    /// Returns the intensity that the sensor reports for a return of this power (thresholds) at this
-    /// range (m). The sensor is calibrated behind a clean window and does not know of dirt.
+    /// Returns the intensity that the sensor reports for a return of this power (thresholds) at
+    /// this range (m). The sensor is calibrated behind a clean window and does not know of dirt.
     pub(crate) fn reported_intensity(&self, power: f32, range_m: f32) -> f32 {
         (power * (range_m * range_m) / self.clean_gain_m2).min(MAX_INTENSITY)
     }
@@ -122,7 +122,8 @@ mod tests {
         };
         assert!((at(1.0) - 0.5).abs() < 1e-6 && (at(0.6) - 0.18).abs() < 1e-6, "{} {}", at(1.0), at(0.6));
         assert_eq!(at(0.0), 0.0);
-        // The receiver saturates at what it receives, not at what would come through a clean window.
+        // The receiver saturates at what it receives, not at what would come through a clean
+        // window.
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         assert_eq!(link.reported_intensity(1e6, 50.0), MAX_INTENSITY);
     }

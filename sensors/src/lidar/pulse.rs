@@ -10,8 +10,8 @@
 //! A Gaussian pulse with the peak P, in detection thresholds, and the standard deviation s exceeds
 //! the threshold for 2·s·√(2·ln P). The echo of a target is the pulse, convolved with the
 //! distribution of the light over the ranges in the footprint, so s² = s₀² + (2/c)²·Var(R). The
-//! variance of the ranges contains the incidence angle, and the parts of a beam that an edge splits.
-//! All of the receiver is in P: the range, the reflectivity, the air and the window.
+//! variance of the ranges contains the incidence angle, and the parts of a beam that an edge
+//! splits. All of the receiver is in P: the range, the reflectivity, the air and the window.
 //!
 //! Deviations from a real receiver:
 //!
@@ -21,9 +21,9 @@
 //!   deviation of the range from top to bottom, and 0.87 from side to side.
 //! - The amplifier does not saturate. A real receiver has a longer tail after a very strong echo.
 //!
-//! Dudzik et al. 2025, *Physically-Based Simulation of Automotive LiDAR* (arXiv 2512.05932), measure
-//! the conversion from received light to echo pulse width for the SCALA 2 by goniometer. Only the
-//! abstract of the paper could be read, so no constant here is theirs.
+//! Dudzik et al. 2025, *Physically-Based Simulation of Automotive LiDAR* (arXiv 2512.05932),
+//! measure the conversion from received light to echo pulse width for the SCALA 2 by goniometer.
+//! Only the abstract of the paper could be read, so no constant here is theirs.
 
 use closecall_traffic::{Environment, maths};
 
@@ -100,8 +100,8 @@ mod tests {
         for (predicted_ns, stated_ns) in predicted_ns.into_iter().zip([12.89, 13.67, 14.70]) {
             assert!((predicted_ns - stated_ns).abs() < 0.005, "{predicted_ns}");
         }
-        // The Ibeo LUX 2010 in openMSL's profile: c·4.5 ns, a range cell of 0.03 m, and the part that
-        // depends on the power (m).
+        // The Ibeo LUX 2010 in openMSL's profile: c·4.5 ns, a range cell of 0.03 m, and the part
+        // that depends on the power (m).
         let measured_m = [0.45, 0.61, 0.65].map(|by_power_m| 0.299_792_458 * 4.5 + 0.03 + by_power_m);
         for (predicted_ns, measured_m) in predicted_ns.into_iter().zip(measured_m) {
             let shares = [predicted_ns / 12.888, measured_m / measured_m_at_20_m()];

@@ -85,8 +85,8 @@ impl RearLidar {
         self.scanner.is_dark()
     }
 
-    /// Writes the beams of these columns of the latest scan that see the road into `beams`, the same
-    /// number for each column: see [`Scanner::probe`].
+    /// Writes the beams of these columns of the latest scan that see the road into `beams`, the
+    /// same number for each column: see [`Scanner::probe`].
     pub(crate) fn look_at_road(&mut self, columns: &[usize], environment: &Environment, beams: &mut Vec<RoadBeam>) {
         self.scanner.probe(columns, environment, beams);
     }
@@ -130,9 +130,9 @@ impl RearLidar {
         Ok(detector.clustered())
     }
 
-    /// Clusters the latest scan once more, and returns the points of each cluster by their indices in
-    /// the scan, as DBSCAN gives them: before clusters of the same vehicle are merged. Returns none
-    /// before the first scan.
+    /// Clusters the latest scan once more, and returns the points of each cluster by their indices
+    /// in the scan, as DBSCAN gives them: before clusters of the same vehicle are merged. Returns
+    /// none before the first scan.
     ///
     /// # Errors
     /// Returns the errors of [`Detector::detect`].

@@ -143,7 +143,8 @@ impl SensorPoseEstimate {
 struct PotentialReturn {
     range_m: f32,
     power: f32,
-    /// Variance of the range within the echo (m²). 0 for a surface unless the scan notes its echoes.
+    /// Variance of the range within the echo (m²). 0 for a surface unless the scan notes its
+    /// echoes.
     range_variance_m2: f32,
     source: PointSource,
     material: Material,

@@ -23,8 +23,8 @@ use closecall_traffic::Environment;
 /// Intensity of the points of a sensor that records none (assumption): neither a droplet nor a
 /// registration plate.
 const UNKNOWN_INTENSITY: f32 = 0.3;
-/// Time before the end of a scan at which a point may have been measured, at most (s): the period of
-/// the slowest sensor that the model covers.
+/// Time before the end of a scan at which a point may have been measured, at most (s): the period
+/// of the slowest sensor that the model covers.
 const LONGEST_SCAN_S: f64 = 1.0;
 /// Time by which a point may be measured after the end of its scan (s): the rounding of a stamp.
 const STAMP_ROUNDING_S: f64 = 1e-3;
@@ -72,8 +72,8 @@ pub struct RecordedPoints {
     pub times: PointTimes,
     /// Beams, as column · layers + layer; `None` if the recording does not say.
     pub beam: Option<Vec<u16>>,
-    /// Position of the sensor ahead of the ego's centre (m) by the measured pitch of the ego; `None`
-    /// for a level ego.
+    /// Position of the sensor ahead of the ego's centre (m) by the measured pitch of the ego;
+    /// `None` for a level ego.
     pub sensor_x_m: Option<f32>,
 }
 
@@ -268,8 +268,8 @@ impl RecordedPoints {
         Ok(())
     }
 
-    /// Returns the start of the scan and the time of each point after it (ns). A sweep of the pattern
-    /// ends with the scan; a point before it makes the scan longer.
+    /// Returns the start of the scan and the time of each point after it (ns). A sweep of the
+    /// pattern ends with the scan; a point before it makes the scan longer.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1 s")]
     fn timed(&mut self, lidar: &Lidar, pattern: &Pattern, beam: &[u16]) -> (Time, Vec<u32>) {
         let start = self.end - Time::from_ns(lidar.kind.sweep_ns as i64);

@@ -30,8 +30,8 @@ pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedS
         let mut from = s_m - RAIL_REACH_M;
         while from < s_m {
             let to = (from + chord).min(s_m);
-            // A rail on the outside of a bend is longer than the line of s, and one on the inside is
-            // shorter. The chords are scaled by it, so that they meet.
+            // A rail on the outside of a bend is longer than the line of s, and one on the inside
+            // is shorter. The chords are scaled by it, so that they meet.
             let scale = if road.alignment().is_some() { road.path_scale(0.5 * (from + to), d_m) } else { 1.0 };
             let half = 0.5 * (to - from) * scale;
             let depth = [0.0, outward * BEAM_DEPTH_M];

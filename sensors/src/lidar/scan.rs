@@ -56,7 +56,8 @@ pub struct LidarScan {
     /// Beam of each point, as column · layers + layer.
     pub beam: Vec<u16>,
     /// What the sensor reports of the echo of each point. Empty unless the scan is complete (see
-    /// [`RearLidar::completed`](super::RearLidar::completed)): the processing chain does not read it.
+    /// [`RearLidar::completed`](super::RearLidar::completed)): the processing chain does not read
+    /// it.
     pub echoes: ScanEchoes,
 }
 

@@ -267,8 +267,8 @@ pub(crate) struct Air<'a> {
 impl<'a> Air<'a> {
     /// Returns the air of a scan.
     pub(crate) fn new(link: &'a LinkBudget, noise: Noise) -> Self {
-        // A return is detected from at most the range at which the densest clump, without any loss of
-        // light before it, has the least power: see `power_in_clear_air`.
+        // A return is detected from at most the range at which the densest clump, without any loss
+        // of light before it, has the least power: see `power_in_clear_air`.
         let densest = most_logarithm(LEAST_UNIFORM) * ROUNDING;
         let at_a_metre = power_in_clear_air(link.extinction_per_m * FOG_CLUMPINESS * densest, 1.0, link);
         let overlap = OVERLAP_M * OVERLAP_M;
@@ -298,7 +298,8 @@ impl<'a> Air<'a> {
         let link = self.link;
         let from_m = NEAREST_M + (1.0 - depth) / ((1.0 + depth) * link.extinction_per_m);
         let clump = most_logarithm(self.noise.uniform(beam, Purpose::FogClump)) * ROUNDING;
-        // The light is at most that from the nearest place that it may come from: exp(−x) ≤ 1/(1 + x).
+        // The light is at most that from the nearest place that it may come from: exp(−x) ≤ 1/(1 +
+        // x).
         let unattenuated = power_in_clear_air(link.extinction_per_m * FOG_CLUMPINESS * clump, from_m, link);
         unattenuated > MIN_POWER * (1.0 + 2.0 * link.extinction_per_m * from_m)
     }

@@ -108,8 +108,8 @@ pub(crate) struct Beams<'a> {
     pub(crate) mirror_side: MirrorSide,
 }
 
-/// Least factor of a range due to the motion of a face during a scan (-; assumption): a vehicle that
-/// is 10 m away and 50 m/s faster comes half of the way in 0.1 s.
+/// Least factor of a range due to the motion of a face during a scan (-; assumption): a vehicle
+/// that is 10 m away and 50 m/s faster comes half of the way in 0.1 s.
 const LEAST_DRIFT: f32 = 0.5;
 
 /// The change of the range at which a beam meets a face while the face moves relative to the
@@ -154,8 +154,8 @@ impl Targets {
     }
 
     /// Notes how the faces move that have been appended since the last call: with `velocity_mps` in
-    /// the sensor's frame (m/s). They are where the targets have them `at_s` after the beginning of the
-    /// scan (s).
+    /// the sensor's frame (m/s). They are where the targets have them `at_s` after the beginning of
+    /// the scan (s).
     #[expect(clippy::cast_possible_truncation, reason = "a factor of a range in single precision")]
     pub(crate) fn note_drift(&mut self, velocity_mps: Vector3<f64>, at_s: f64) {
         for face in &self.faces[self.drifts.len()..] {
@@ -165,8 +165,8 @@ impl Targets {
         }
     }
 
-    /// Returns the range at which a beam meets a face (m), `offset_ns` after the beginning of the scan,
-    /// for the range at which it meets the face where the targets have it.
+    /// Returns the range at which a beam meets a face (m), `offset_ns` after the beginning of the
+    /// scan, for the range at which it meets the face where the targets have it.
     #[inline(always)]
     pub(crate) fn drifted_m(&self, face: u32, range_m: f32, offset_ns: u32) -> f32 {
         match self.drifts.get(face as usize) {

@@ -1,7 +1,7 @@
 //! The road monitor of one LiDAR: which beams it looks at in which scan.
 //!
-//! The field of view is divided into sectors of 1.5°, so that a blocked sector of 3° contains one of
-//! them, wherever it lies. Each scan visits two sectors, one column of each. The SCALA has 89
+//! The field of view is divided into sectors of 1.5°, so that a blocked sector of 3° contains one
+//! of them, wherever it lies. Each scan visits two sectors, one column of each. The SCALA has 89
 //! sectors, which take 1.8 s.
 
 use std::ops::Range;
@@ -41,8 +41,8 @@ impl RoadWatch {
 
     /// Looks at some beams of the latest scan.
     ///
-    /// A wet road and droplets in the air take an unknown part of the light. A rain sensor tells the
-    /// ego of them, and the monitor pauses.
+    /// A wet road and droplets in the air take an unknown part of the light. A rain sensor tells
+    /// the ego of them, and the monitor pauses.
     pub(super) fn look(&mut self, lidar: &mut RearLidar, scene: &Scene<'_>) {
         let environment = scene.environment;
         let is_wet = environment.water_film_mm > 0.0 || environment.rain_mm_per_h > 0.0;

@@ -18,15 +18,15 @@
 //! *Heights.* A height lies beyond three standard deviations on one side with a probability of
 //! 0.00135. The two heights of a scan share the error of the levelling, so they count as one: by
 //! the same bound, more than an eighth of 80 heights, six pairs, has the probability 2·10⁻¹⁰ on one
-//! side alone, and more than four fifths far less. Counts, unlike moments, bear the returns of tyres
-//! and side guards among the heights: these are all too high, and between two trucks they are two
-//! thirds.
+//! side alone, and more than four fifths far less. Counts, unlike moments, bear the returns of
+//! tyres and side guards among the heights: these are all too high, and between two trucks they are
+//! two thirds.
 //!
 //! *Sectors.* A sensor that loses returns everywhere is not blocked. The probability of a return in
 //! a sector is therefore multiplied by the share of the beams that gave one in the latest 25 scans.
-//! A sensor with a blocked sector, however wide, does not lose returns elsewhere. A visit of several
-//! beams without any return therefore says nothing of missing returns. Without such visits, fewer
-//! misses are expected, so that the bound holds.
+//! A sensor with a blocked sector, however wide, does not lose returns elsewhere. A visit of
+//! several beams without any return therefore says nothing of missing returns. Without such visits,
+//! fewer misses are expected, so that the bound holds.
 
 use closecall_traffic::maths;
 
@@ -44,7 +44,8 @@ const MOST_CERTAIN: f64 = 1.0 - 1e-6;
 const LEAST_PROBABILITY: f64 = 0.5;
 /// Number of scans over which missing returns are counted.
 const RETURN_SCANS: u32 = 25;
-/// Number of scans over which heights are counted, at least: the SCALA looks once in all directions.
+/// Number of scans over which heights are counted, at least: the SCALA looks once in all
+/// directions.
 const HEIGHT_SCANS: u32 = 50;
 /// Number of heights that a bare road would give, at least, for a decision. The SCALA sees 70 to
 /// 110 in 50 scans: so many depends on the pitch of the ego.
@@ -235,8 +236,8 @@ impl Returns {
         }
     }
 
-    /// Returns the share of the beams outside blocked sectors that have given a return. If returns are
-    /// missing, visits without any are among the losses.
+    /// Returns the share of the beams outside blocked sectors that have given a return. If returns
+    /// are missing, visits without any are among the losses.
     fn returned_share(self) -> f64 {
         let empty = if self.are_missing() { self.empty } else { 0 };
         let (misses, beams) = (self.misses + empty, self.beams + empty);

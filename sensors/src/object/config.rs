@@ -4,7 +4,7 @@
 //!
 //! | key | front radar | surround | rear object |
 //! |---|---|---|---|
-//! | `range-m` | 150 | 14 (b) | 133.9 (c) |
+//! | `range-m` | 150 | 14 (b) | 128.8 (c) |
 //! | `half-angle-deg` | 45 (a) | all directions | 66.5 (c) |
 //! | `range-sd-m` | 0.1 (a) | 0.1 (b) | by vehicle (c) |
 //! | `lateral-sd-m` | 0.3 | 0.15 | by vehicle (c) |

@@ -49,8 +49,8 @@ pub struct RearFit {
     pub origin: Origin,
     /// Score of the true class, by class.
     pub class_confidence: ByClass,
-    /// Standard deviation of the logarithm of the range of one vehicle about the logarithm of the
-    /// grid's range (-).
+    /// Standard deviation of the logarithm of the range of one vehicle under other noise of the
+    /// sensors (-).
     pub range_spread: f64,
     /// Reflectivities of the paint of the grid (-), in rising order.
     pub paints: Vec<f64>,

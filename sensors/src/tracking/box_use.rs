@@ -8,7 +8,8 @@ use closecall_traffic::TrackId;
 pub struct Innovation {
     /// Mean over the modes of motion (m).
     pub innovation_m: f64,
-    /// Predicted variance of the innovation (m²): the mean over the modes plus the spread of the modes.
+    /// Predicted variance of the innovation (m²): the mean over the modes plus the spread of the
+    /// modes.
     pub variance_m2: f64,
 }
 

@@ -87,13 +87,14 @@ const FIRST_KNOT_M: f64 = -216.0;
 /// Steps of the search for the road position of a knot, which converges quadratically.
 const KNOT_STEPS: u8 = 6;
 
-/// The ego's path along a road with an alignment, in the ego's vehicle frame: a cubic between knots,
-/// at which position and slope are exact. Between them it deviates by less than 5 mm, on clothoids as
-/// at a jump from a line to an arc of the smallest radius, 250 m. Beyond the knots, it is the tangent.
+/// The ego's path along a road with an alignment, in the ego's vehicle frame: a cubic between
+/// knots, at which position and slope are exact. Between them it deviates by less than 5 mm, on
+/// clothoids as at a jump from a line to an arc of the smallest radius, 250 m. Beyond the knots, it
+/// is the tangent.
 ///
 /// The bound holds for a change of the curvature of up to 1.25e-4 1/m², which is 1/A² for the
-/// parameter A of a clothoid. The least A of German motorways is 300 m, 160 m and 90 m in the design
-/// classes EKA 1 A, EKA 2 and EKA 3: 1.1e-5 to 1.2e-4 1/m² (FGSV 2008, RAA, as
+/// parameter A of a clothoid. The least A of German motorways is 300 m, 160 m and 90 m in the
+/// design classes EKA 1 A, EKA 2 and EKA 3: 1.1e-5 to 1.2e-4 1/m² (FGSV 2008, RAA, as
 /// <https://www.bauformeln.de/strassenbau/grenz-und-richtwerte/autobahnen/> reproduces its table).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathCourse {

@@ -1,4 +1,5 @@
-//! Emergency braking held against crash records: does the simulation find what insurers found on the road?
+//! Emergency braking held against crash records: does the simulation find what insurers found on
+//! the road?
 //!
 //! ```text
 //!  anchor-lead-brakes ─▶ its own drivers ─┐
@@ -6,10 +7,12 @@
 //!                     ─▶ each variation ──┘     (the same samples)
 //! ```
 //!
-//! Cicchino (Accident Analysis and Prevention, 2017, doi 10.1016/j.aap.2016.11.009) found that cars with a warning and emergency
-//! braking strike other vehicles half as often as the same models without, and are struck from behind 1.2 times as often. The range
-//! of the ratios over the driver ensemble covers these values or not. The variations change one assumption at a time, and show which
-//! one moves a ratio most. `docs/evidence/anchor.md` is the protocol; nothing here is chosen by its effect on the ratios.
+//! Cicchino (Accident Analysis and Prevention, 2017, doi 10.1016/j.aap.2016.11.009) found that cars
+//! with a warning and emergency braking strike other vehicles half as often as the same models
+//! without, and are struck from behind 1.2 times as often. The range of the ratios over the driver
+//! ensemble covers these values or not. The variations change one assumption at a time, and show
+//! which one moves a ratio most. `docs/evidence/anchor.md` is the protocol; nothing here is chosen
+//! by its effect on the ratios.
 
 mod paired;
 mod result;
@@ -120,7 +123,8 @@ impl AnchorPlan {
         (self.members.len() + self.variations.len()) as u64 * self.sampling.samples
     }
 
-    /// Runs the study. `None` if `stop` has ended it early. `on_sample` is called after each sample.
+    /// Runs the study. `None` if `stop` has ended it early. `on_sample` is called after each
+    /// sample.
     ///
     /// # Errors
     /// [`WorkersError`] if no threads can be started.
@@ -182,7 +186,8 @@ fn varied(file: &ScenarioFile, name: &str, text: &str) -> Result<Entry, Scenario
     Ok(Entry { name: name.to_owned(), setting: Some(text.to_owned()), file: varied })
 }
 
-/// Counts what happened in both arms of a sample. A sample that lacks an outcome is an error, and counts nowhere.
+/// Counts what happened in both arms of a sample. A sample that lacks an outcome is an error, and
+/// counts nowhere.
 fn count(record: &Record, row: &mut Row, errors: &mut RunErrors) {
     let failures = record.arms.iter().filter_map(|arm| arm.result.as_ref().err());
     for failure in failures {
@@ -229,7 +234,8 @@ mod tests {
         }
     }
 
-    /// Where the ego never has to brake hard, emergency braking does nothing. A follower that is close and late strikes in both arms.
+    /// Where the ego never has to brake hard, emergency braking does nothing. A follower that is
+    /// close and late strikes in both arms.
     #[test]
     fn an_arm_without_effect_has_the_ratio_1() {
         let gentle = [
@@ -250,7 +256,8 @@ mod tests {
         assert_eq!(struck.ratio().map(|ratio| ratio.value), Some(1.0));
     }
 
-    /// A built case: the ego follows at 0.3 s, reacts late, and the lead vehicle brakes hard; the follower is far away.
+    /// A built case: the ego follows at 0.3 s, reacts late, and the lead vehicle brakes hard; the
+    /// follower is far away.
     #[test]
     fn a_strike_without_emergency_braking_is_counted_and_its_prevention_too() {
         let built = ["following-mps=15", "ego-cc1-s=0.6", "ego-reaction-s=2.5", "brake-mps2=5", "rear-cc1-s=2.6"];

@@ -1,16 +1,18 @@
 //! Counts of an outcome in two arms that run the same samples, and the ratio of the counts.
 //!
-//! The logarithm of the ratio n₁/n₀ of two paired counts has the variance (b + c)/(n₀·n₁), where b samples have the outcome only
-//! without the system, and c only with it. It follows from the delta method for a multinomial distribution, and is 0 if both arms
-//! agree in every sample. If the outcome never happens with the system, the ratio is 0, and its upper bound is the bound of the share of
-//! the n₀ samples that keep the outcome (Clopper-Pearson).
+//! The logarithm of the ratio n₁/n₀ of two paired counts has the variance (b + c)/(n₀·n₁), where b
+//! samples have the outcome only without the system, and c only with it. It follows from the delta
+//! method for a multinomial distribution, and is 0 if both arms agree in every sample. If the
+//! outcome never happens with the system, the ratio is 0, and its upper bound is the bound of the
+//! share of the n₀ samples that keep the outcome (Clopper-Pearson).
 
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::maths;
 use closecall_traffic::statistics::interval::clopper_pearson;
 use closecall_traffic::statistics::sensitivity::jackknife::Estimate;
 
-/// Number of collisions without the system from which on a ratio is part of a range: the protocol's.
+/// Number of collisions without the system from which on a ratio is part of a range: the
+/// protocol's.
 pub const LEAST_COLLISIONS: u64 = 10;
 
 /// The quantile of the standard normal distribution with 97.5 % below it.
@@ -19,7 +21,8 @@ const Z_975: f64 = 1.959_963_984_540_054;
 /// What happened to the ego in one run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Happened {
-    /// It struck another vehicle, before another one struck it. An ego that is struck first is pushed.
+    /// It struck another vehicle, before another one struck it. An ego that is struck first is
+    /// pushed.
     pub strikes: bool,
     /// Another vehicle struck it.
     pub is_struck: bool,
@@ -69,7 +72,8 @@ impl Paired {
         self.both + self.only_with
     }
 
-    /// Returns the ratio of the count with the system to the count without it; `None` if the outcome does not happen without it.
+    /// Returns the ratio of the count with the system to the count without it; `None` if the
+    /// outcome does not happen without it.
     pub fn ratio(&self) -> Option<Estimate> {
         if self.without() == 0 {
             return None;
@@ -88,7 +92,8 @@ impl Paired {
         self.without() >= LEAST_COLLISIONS
     }
 
-    /// Returns the logarithm of the ratio, with half a collision added to each count, so that it is finite.
+    /// Returns the logarithm of the ratio, with half a collision added to each count, so that it is
+    /// finite.
     pub fn log_ratio(&self) -> f64 {
         maths::ln((self.with() as f64 + 0.5) / (self.without() as f64 + 0.5))
     }

@@ -18,7 +18,8 @@ impl Quantity {
     /// Both quantities.
     pub const ALL: [Self; 2] = [Self::Striking, Self::Struck];
 
-    /// Returns the published ratio of rates, with a warning and emergency braking to without (Cicchino 2017).
+    /// Returns the published ratio of rates, with a warning and emergency braking to without
+    /// (Cicchino 2017).
     pub const fn published(self) -> f64 {
         match self {
             Self::Striking => 0.50,
@@ -110,7 +111,8 @@ pub struct Anchor {
 }
 
 impl Anchor {
-    /// Returns the smallest and the largest ratio of the members that have enough collisions; `None` if none has.
+    /// Returns the smallest and the largest ratio of the members that have enough collisions;
+    /// `None` if none has.
     pub fn range(&self, quantity: Quantity) -> Option<[f64; 2]> {
         let ratios = self.members.iter().filter_map(|row| row.ranged(quantity)).map(|ratio| ratio.value);
         ratios.fold(None, |range: Option<[f64; 2]>, ratio| {
@@ -130,8 +132,8 @@ impl Anchor {
         self.members.iter().filter(agrees).map(|row| row.name.as_str())
     }
 
-    /// Returns the variation that moves the ratio furthest from the ratio of the scenario's own drivers, by its logarithm, with both
-    /// ratios; `None` if too few collide.
+    /// Returns the variation that moves the ratio furthest from the ratio of the scenario's own
+    /// drivers, by its logarithm, with both ratios; `None` if too few collide.
     pub fn mover(&self, quantity: Quantity) -> Option<(&Row, [f64; 2])> {
         let own = self.members.first()?;
         let (of_own, own) = (own.paired(quantity).log_ratio(), own.ranged(quantity)?.value);

@@ -16,8 +16,8 @@ use super::Trace;
 use super::counterfactual::{Braking, Pair};
 use crate::case::{Case, CausesError, fails};
 
-/// The competent and careful driver of UN Regulation 157 in the place of the ego: it starts where the ego starts, and
-/// follows with its gap.
+/// The competent and careful driver of UN Regulation 157 in the place of the ego: it starts where
+/// the ego starts, and follows with its gap.
 struct CarefulEgo;
 
 impl ControllerFactory for CarefulEgo {
@@ -155,8 +155,8 @@ pub fn attribute(case: &Case, settings: &[Setting]) -> Result<(Outcome, Option<A
     Ok((outcome, attribution))
 }
 
-/// Returns whether no vehicle collides with the competent and careful driver of UN Regulation 157 in
-/// the place of the ego; `None` if this run has no outcome.
+/// Returns whether no vehicle collides with the competent and careful driver of UN Regulation 157
+/// in the place of the ego; `None` if this run has no outcome.
 pub(super) fn careful_ego_avoids(scenario: &Scenario, key: RunKey) -> Option<bool> {
     let careful = Arm { controller: Arc::new(CarefulEgo), sensors: Some(SensorMode::GroundTruth) };
     run_guarded(scenario, key, &careful, &mut NoObserver).ok().map(|outcome| !fails(&outcome))

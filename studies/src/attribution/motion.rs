@@ -18,8 +18,8 @@ pub struct Motion {
 
 impl Motion {
     /// Returns how each collision of the run was avoidable, in the order of the outcome. `scenario`
-    /// and `key` are of the run: with a collision, the scenario runs again with the careful driver in
-    /// the place of the ego. An answer is `None` if this observer has not seen the collision.
+    /// and `key` are of the run: with a collision, the scenario runs again with the careful driver
+    /// in the place of the ego. An answer is `None` if this observer has not seen the collision.
     ///
     /// A later collision follows earlier ones: until the striking vehicle brakes otherwise, all
     /// vehicles move as they did.

@@ -153,7 +153,8 @@ mod tests {
     use super::*;
     use crate::explain::MisRun;
 
-    /// The effect of a system that engaged or not; switching off all of its states prevents the failure or not.
+    /// The effect of a system that engaged or not; switching off all of its states prevents the
+    /// failure or not.
     fn effect(engaged_at_s: Option<f64>, all_prevent: bool) -> MisEffect {
         let run = |off: &[MisState], prevents| MisRun { off: off.to_vec(), setting: String::new(), prevents };
         let mut runs: Vec<MisRun> = MisState::ALL.iter().map(|state| run(&[*state], false)).collect();

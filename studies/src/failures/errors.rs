@@ -23,8 +23,8 @@ pub struct SampleErrors {
 }
 
 impl SampleErrors {
-    /// Returns the errors of a campaign in one arm, by default in the arm under test; `None` if there
-    /// are none. `scenario` may be left out for all scenarios.
+    /// Returns the errors of a campaign in one arm, by default in the arm under test; `None` if
+    /// there are none. `scenario` may be left out for all scenarios.
     ///
     /// # Errors
     /// [`CausesError`] if the folder cannot be read.

@@ -12,8 +12,8 @@
 //! towards its nominal value by bisection, on a grid of readable values. The random numbers of the
 //! sample stay: the files name them, and a plain `closecall run FILE` repeats the case.
 //!
-//! The smallest case has the fewest parameters off nominal. The failing case *nearest* to the nominal
-//! one ([`NearestSearch`]) has the smallest distance in standard normal space, with as many
+//! The smallest case has the fewest parameters off nominal. The failing case *nearest* to the
+//! nominal one ([`NearestSearch`]) has the smallest distance in standard normal space, with as many
 //! parameters off nominal as that takes.
 
 mod design_point;

@@ -10,9 +10,9 @@
 //! models with prescribed marginals and covariances*, Probabilistic Engineering Mechanics 1 (1986)
 //! 105–112). Of all failing cases, the nearest one has the largest probability density there.
 //!
-//! The random streams of drivers and sensors have no distance. Each search keeps the streams of the sample
-//! from which it starts. A label that fails as well at its nominal value is set to it first; the
-//! search then moves the numbers only.
+//! The random streams of drivers and sensors have no distance. Each search keeps the streams of the
+//! sample from which it starts. A label that fails as well at its nominal value is set to it first;
+//! the search then moves the numbers only.
 
 use std::collections::BTreeMap;
 
@@ -28,8 +28,8 @@ use super::trial::{Trial, WithoutOutcome};
 use crate::case::{Case, CausesError, fails};
 use crate::failures::{SampleErrors, passes};
 
-/// Number of failing samples from which the rays to the nominal case are searched (-), and number of
-/// rays with the nearest failures that are searched on (-): assumptions; 5 to 50 and 1 to 10 are
+/// Number of failing samples from which the rays to the nominal case are searched (-), and number
+/// of rays with the nearest failures that are searched on (-): assumptions; 5 to 50 and 1 to 10 are
 /// plausible.
 const STARTS: usize = 12;
 const CONTINUED: u64 = 3;
@@ -95,8 +95,8 @@ struct Labelled<'a, 'b> {
 }
 
 impl NearestSearch {
-    /// Prepares a search from one sample, or from all failing samples. `scenario` may be left out if
-    /// the campaign has only one, `controller` for the arm under test.
+    /// Prepares a search from one sample, or from all failing samples. `scenario` may be left out
+    /// if the campaign has only one, `controller` for the arm under test.
     ///
     /// # Errors
     /// [`CausesError`] if the campaign has no such scenario, sample or arm, no sample fails, or the
@@ -197,8 +197,8 @@ impl NearestSearch {
         Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, without_outcome, ..described }))
     }
 
-    /// Returns the failing samples that are nearest to the nominal case, the nearest first. A sample
-    /// with a value at a bound of its distribution is infinitely far, and no start.
+    /// Returns the failing samples that are nearest to the nominal case, the nearest first. A
+    /// sample with a value at a bound of its distribution is infinitely far, and no start.
     fn starts(&self) -> Vec<Start> {
         let space = self.case.file.space();
         let starts = self.samples.iter().filter_map(|sample| {
@@ -216,8 +216,9 @@ fn values_at(trial: &Trial<'_>, point: &NormalPoint) -> Parameters {
     trial.case.file.space().at_normal_point(point)
 }
 
-/// Moves a sample along the ray to the nominal case, with as many nominal labels as possible. Returns
-/// the first failing case, and whether none can be nearer; `None` if the sample itself does not fail.
+/// Moves a sample along the ray to the nominal case, with as many nominal labels as possible.
+/// Returns the first failing case, and whether none can be nearer; `None` if the sample itself does
+/// not fail.
 fn drawn_in(trial: &Trial<'_>, mut point: NormalPoint) -> Option<(NormalPoint, bool)> {
     let does_fail = |point: &NormalPoint| trial.fails(&values_at(trial, point));
     if !does_fail(&point) {

@@ -29,7 +29,7 @@ pub struct Offset {
     pub sampled: String,
     /// Its nominal value.
     pub nominal: String,
-    /// The value in words, in the units of a reader.
+    /// The value in words, with its unit.
     pub words: String,
     /// How far the value is from the nominal one, with sign (standard deviations); `None` of a value
     /// that the distribution never takes.
@@ -37,7 +37,7 @@ pub struct Offset {
     /// How far the value is from the nominal one, with sign, in the parameter's unit; `None` of a
     /// label.
     pub difference: Option<f64>,
-    /// The difference in words, in the units of a reader.
+    /// The difference in words, with its unit.
     #[serde(skip)]
     pub difference_words: Option<String>,
 }

@@ -1,49 +1,44 @@
-//! Values and changes in the units of a reader.
+//! Values and changes in words, with their units.
 
 use closecall_traffic::{Value, maths};
 
 use super::Offset;
 use crate::attribution::{Attribution, phase_word};
 
-/// Kilometres per hour in one metre per second.
-const KMH_PER_MPS: f64 = 3.6;
-
-/// A unit by the ending of a parameter's name: the unit of a reader, the factor to it, and its
-/// decimals.
-const UNITS: [(&str, &str, f64, usize); 7] = [
-    ("-mps2", "m/s²", 1.0, 1),
-    ("-mps3", "m/s³", 1.0, 1),
-    ("-mps", "km/h", KMH_PER_MPS, 1),
-    ("-rad", "rad", 1.0, 3),
-    ("-km", "km", 1.0, 2),
-    ("-m", "m", 1.0, 1),
-    ("-s", "s", 1.0, 2),
+/// A unit by the ending of a parameter's name, and its decimals.
+const UNITS: [(&str, &str, usize); 7] = [
+    ("-mps2", "m/s²", 1),
+    ("-mps3", "m/s³", 1),
+    ("-mps", "m/s", 1),
+    ("-rad", "rad", 3),
+    ("-km", "km", 2),
+    ("-m", "m", 1),
+    ("-s", "s", 2),
 ];
 
 /// A parameter's name without its unit, and how its numbers are written.
 struct Named<'a> {
     name: String,
     unit: &'a str,
-    factor: f64,
     decimals: usize,
 }
 
 impl Named<'_> {
     fn of(name: &str) -> Self {
-        let named = UNITS.into_iter().find_map(|(ending, unit, factor, decimals)| {
-            Some(Named { name: name.strip_suffix(ending)?.replace('-', " "), unit, factor, decimals })
+        let named = UNITS.into_iter().find_map(|(ending, unit, decimals)| {
+            Some(Named { name: name.strip_suffix(ending)?.replace('-', " "), unit, decimals })
         });
-        named.unwrap_or_else(|| Named { name: name.replace('-', " "), unit: "", factor: 1.0, decimals: 2 })
+        named.unwrap_or_else(|| Named { name: name.replace('-', " "), unit: "", decimals: 2 })
     }
 
-    /// Returns two numbers and their difference in the unit of a reader, all with the same
-    /// decimals. The decimals are those that a step of the grid needs, or more if the two numbers
-    /// would look the same. The difference is the difference of the written numbers.
+    /// Returns two numbers and their difference with the unit, all with the same decimals. The
+    /// decimals are those that a step of the grid needs, or more if the two numbers would look the
+    /// same. The difference is the difference of the written numbers.
     fn numbers(&self, values: [f64; 2], step: Option<f64>) -> [String; 3] {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "steps are above 1e-12")]
-        let needed = |step: f64| (-maths::log10(step * self.factor)).ceil().max(0.0) as usize;
+        let needed = |step: f64| (-maths::log10(step)).ceil().max(0.0) as usize;
         let least = step.map_or(self.decimals, needed);
-        let written = |decimals: i32| values.map(|value| (value * self.factor * 10_f64.powi(decimals)).round());
+        let written = |decimals: i32| values.map(|value| (value * 10_f64.powi(decimals)).round());
         let differ = |decimals: &usize| {
             let [first, second] = written(*decimals as i32);
             first != second
@@ -58,7 +53,7 @@ impl Named<'_> {
     }
 }
 
-/// Returns a value and the nominal one in words, such as `closing 39.2 km/h (nominal 30.1 km/h)`.
+/// Returns a value and the nominal one in words, such as `closing 10.9 m/s (nominal 8.4 m/s)`.
 /// `step` is the step of the parameter's grid.
 pub(super) fn value(name: &str, value: &Value, nominal: &Value, step: Option<f64>) -> String {
     let named = Named::of(name);
@@ -71,7 +66,7 @@ pub(super) fn value(name: &str, value: &Value, nominal: &Value, step: Option<f64
     }
 }
 
-/// Returns how far a number is from the nominal one in words, such as `9.1 km/h more`; `None` of a
+/// Returns how far a number is from the nominal one in words, such as `2.5 m/s more`; `None` of a
 /// label. `step` is the step of the parameter's grid.
 pub(super) fn difference(name: &str, value: &Value, nominal: &Value, step: Option<f64>) -> Option<String> {
     let (Value::Number(value), Value::Number(nominal)) = (value, nominal) else { return None };
@@ -96,10 +91,10 @@ pub(super) fn change(name: &str, failing: &Value, passing: &Value, step: Option<
 /// Returns the smallest failing case in a sentence.
 pub(super) fn sentence(collision: &Attribution, off: &[Offset]) -> String {
     let strike = format!(
-        "{} strikes {} with {:.1} km/h, {:.1} s after the start (phase {})",
+        "{} strikes {} with {:.1} m/s, {:.1} s after the start (phase {})",
         collision.striking.actor,
         collision.struck.actor,
-        KMH_PER_MPS * collision.relative_speed_mps,
+        collision.relative_speed_mps,
         collision.time_s,
         phase_word(collision.phase),
     );
@@ -125,25 +120,22 @@ mod tests {
         assert_eq!(change("brake-phase", 0.245, 0.26, 0.005), "brake phase is 0.015 more (0.260 instead of 0.245)");
         assert_eq!(change("brake-at-s", 16.2, 16.0, 0.1), "brake at is 0.2 s less (16.0 s instead of 16.2 s)");
         assert_eq!(change("gap-m", 120.0, 100.0, 20.0), "gap is 20 m less (100 m instead of 120 m)");
-        // 30.06 and 29.916 km/h: the difference is the difference of the written numbers.
-        assert_eq!(
-            change("closing-mps", 8.35, 8.31, 0.05),
-            "closing is 0.2 km/h less (29.9 km/h instead of 30.1 km/h)"
-        );
+        // The difference is the difference of the written numbers.
+        assert_eq!(change("closing-mps", 8.36, 8.24, 0.1), "closing is 0.2 m/s less (8.2 m/s instead of 8.4 m/s)");
     }
 
     #[test]
     fn values_and_changes_have_the_units_of_a_reader() {
         let number = Value::Number;
-        assert_eq!(value("closing-mps", &number(10.0), &number(8.35), None), "closing 36.0 km/h (nominal 30.1 km/h)");
+        assert_eq!(value("closing-mps", &number(10.0), &number(8.3), None), "closing 10.0 m/s (nominal 8.3 m/s)");
         assert_eq!(
             change("brake-mps2", &number(6.0), &number(5.95), None),
             "brake is 0.05 m/s² less (5.95 m/s² instead of 6.00 m/s²)"
         );
         let label = |text: &str| Value::Label(text.to_owned());
         let to_nominal = |from: f64, to: f64| difference("closing-mps", &number(from), &number(to), None);
-        assert_eq!(to_nominal(10.0, 8.35).as_deref(), Some("5.9 km/h more"));
-        assert_eq!(to_nominal(8.35, 10.0).as_deref(), Some("5.9 km/h less"));
+        assert_eq!(to_nominal(10.0, 8.3).as_deref(), Some("1.7 m/s more"));
+        assert_eq!(to_nominal(8.3, 10.0).as_deref(), Some("1.7 m/s less"));
         assert_eq!(difference("rear-class", &label("truck"), &label("car"), None), None);
         assert_eq!(
             change("rear-class", &label("motorcycle"), &label("car"), None),

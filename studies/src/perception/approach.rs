@@ -2,9 +2,11 @@
 
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorError, Sensors, TrackAudit};
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Road, Source, Stream, Track, TrackStatus, Vehicle, VehicleClass, VehicleState, maths, stream,
+    ActorId, CONTROL_STEP, Road, Source, StandardNormal, Stream, Track, TrackStatus, Vehicle, VehicleClass,
+    VehicleState, maths, stream,
 };
 use rand::RngExt;
+use rand::distr::Distribution;
 
 use crate::perception::cases::{Case, ego_lane};
 
@@ -19,6 +21,10 @@ const EGO_S_M: f64 = 1_000.0;
 pub const GAPS_M: [f64; 2] = [150.0, 5.0];
 /// Closing speeds (m/s): 10 to 50 km/h, as in the scenarios of the library.
 const CLOSING_MPS: [f64; 2] = [2.8, 13.9];
+/// Standard deviation of the lateral position of a vehicle whose first track is looked for (m): the
+/// lane keeping of the rear vehicles in the library. A vehicle that is always in line with the
+/// sensor is struck at the same heights and edges in every approach.
+const LANE_KEEPING_M: f64 = 0.2;
 /// Gap of the car in between (m).
 const SCREEN_GAP_M: f64 = 25.0;
 /// Gap at which a vehicle appears for the time to confirm (m), and the longest time that is waited
@@ -209,19 +215,33 @@ fn observe(
     Ok(approach)
 }
 
+/// An approach that is followed from the first gap on.
+struct Course<'a> {
+    case: &'a Case,
+    sensors: &'a Sensors,
+    road: &'a Road,
+    /// The approach whose movement it has.
+    at: Address,
+    /// The approach whose noise of the sensors it has.
+    noise: Address,
+    /// Standard deviation of the lateral position of the vehicle (m).
+    lane_keeping_m: f64,
+    /// The first gap (m).
+    from_m: f64,
+}
+
 /// Drives an approach, and calls `see` with the gap (m), the confirmed track, and the traffic in
 /// each step, until `see` returns false.
-fn follow(
-    (case, sensors, road, at): (&Case, &Sensors, &Road, Address),
-    from_m: f64,
-    mut see: impl FnMut(f64, Option<&Track>, &Traffic) -> bool,
-) -> Result<(), SensorError> {
+fn follow(course: &Course<'_>, mut see: impl FnMut(f64, Option<&Track>, &Traffic) -> bool) -> Result<(), SensorError> {
+    let Course { case, sensors, road, at, noise, lane_keeping_m, from_m } = *course;
     let mut rng = stream(at.seed, at.run, &ego_name(), "approach");
     let [slowest, fastest] = CLOSING_MPS;
     let closing_mps = slowest + (fastest - slowest) * rng.random::<f64>();
     let start_m = from_m + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
+    let deviation: f64 = StandardNormal.sample(&mut rng);
+    let case = &Case { offset_m: case.offset_m + lane_keeping_m * deviation, ..case.clone() };
     let mut traffic = Traffic::new(case, road, start_m, closing_mps);
-    let mut perception = build(sensors, at)?;
+    let mut perception = build(sensors, noise)?;
     for step in 0.. {
         let gap_m = traffic.gap_m();
         let time = CONTROL_STEP * step;
@@ -307,13 +327,20 @@ impl Watch {
     }
 }
 
-/// Returns the gaps at which the vehicle has a track.
+/// Returns the gaps at which the vehicle has a track, in an approach with the noise of another one.
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
-pub(crate) fn sightings(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Sightings, SensorError> {
+pub(crate) fn sightings(
+    case: &Case,
+    sensors: &Sensors,
+    road: &Road,
+    at: Address,
+    noise: Address,
+) -> Result<Sightings, SensorError> {
     let mut watch = Watch::new();
-    follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
+    let course = Course { case, sensors, road, at, noise, lane_keeping_m: LANE_KEEPING_M, from_m: GAPS_M[0] };
+    follow(&course, |gap_m, track, _| {
         let track = track.filter(|track| track.existence >= 0.5).map(|track| track.class.is_vehicle());
         watch.observe(gap_m, track);
         !watch.is_settled(gap_m)
@@ -334,7 +361,8 @@ pub(crate) fn scores(
 ) -> Result<Vec<f64>, SensorError> {
     let mut scores = Vec::new();
     // The track has settled when the vehicle reaches the gaps.
-    follow((case, sensors, road, at), far_m + 20.0, |gap_m, track, _| {
+    let course = Course { case, sensors, road, at, noise: at, lane_keeping_m: 0.0, from_m: far_m + 20.0 };
+    follow(&course, |gap_m, track, _| {
         scores.extend(track.filter(|_| gap_m <= far_m).map(|track| track.class.0[case.class as usize]));
         gap_m >= near_m
     })?;

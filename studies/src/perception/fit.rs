@@ -9,7 +9,10 @@
 //!
 //! Only perception is fitted: no controller runs, and no collision counts. A range is the mean
 //! distance from which on a confirmed track lasts, plus the distance that the object-level sensor
-//! itself needs to confirm a vehicle. Beyond, a body shape is seen at a share of the distances. A
+//! itself needs to confirm a vehicle. Beyond, a body shape is seen at a share of the distances. The
+//! spread of a range is its scatter under other noise of the sensors. The place of the vehicle in its
+//! lane moves a range too, and the mean is over places. No spread stands for it: a drawn distance
+//! does not follow the place that the vehicle has in a run. A
 //! class range is the mean distance at which a track that lasts is first classified as a vehicle,
 //! plus the distance that the latency costs. It is a distance and no
 //! time, because the full chain recognises a vehicle in fog at nearly the same distance at all
@@ -82,15 +85,14 @@ struct Fitter<'a> {
 pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
     let fitter = Fitter::new(plan)?;
     let usual = fitter.usual_errors()?;
-    let (range, range_spread) = fitter.ranges(&usual)?;
     let ranges = RearFit {
         origin: plan.origin(),
         errors: fitter.same_errors(&usual),
         class_confidence: fitter.class_confidence()?,
-        range_spread,
+        range_spread: fitter.range_spread()?,
         paints: PAINTS.to_vec(),
         extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
-        range,
+        range: fitter.ranges(&usual)?,
         shapes: fitter.shapes()?,
         validation: None,
     };
@@ -106,13 +108,12 @@ pub fn fit_ranges(plan: &FitPlan<'_>, errors: &RearFit) -> Result<RearFit, Study
     let fitter = Fitter::new(plan)?;
     let usual = Vehicle::typical(VehicleClass::Car);
     let usual_errors = errors.errors.at(usual.class, &usual.appearance, &Environment::CLEAR_DAY);
-    let (range, range_spread) = fitter.ranges(&usual_errors)?;
     Ok(RearFit {
         origin: plan.origin(),
-        range_spread,
+        range_spread: fitter.range_spread()?,
         paints: PAINTS.to_vec(),
         extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
-        range,
+        range: fitter.ranges(&usual_errors)?,
         shapes: fitter.shapes()?,
         validation: None,
         ..errors.clone()
@@ -193,11 +194,42 @@ impl Fitter<'_> {
 
     /// Returns the gaps with a track in all approaches of a case.
     fn sightings(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Sightings>, StudyError> {
+        self.sightings_with_noise_of(0, case, sensors)
+    }
+
+    /// Returns the gaps with a track in all approaches of a case, each with the noise of the approach
+    /// whose number is larger by `further`.
+    fn sightings_with_noise_of(
+        &self,
+        further: u64,
+        case: &Case,
+        sensors: &Sensors,
+    ) -> Result<Vec<Sightings>, StudyError> {
         let of_run = |run| {
-            sightings(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
+            let at = |run| Address { seed: self.plan.seed, run };
+            sightings(case, sensors, &self.scenario.road, at(run), at(run + further))
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
         (0..self.plan.approaches).into_par_iter().map(of_run).collect()
+    }
+
+    /// Returns the standard deviation of the logarithm of a car's range under other noise of the
+    /// sensors (-).
+    fn range_spread(&self) -> Result<f64, StudyError> {
+        let (mut squares, mut pairs) = (0.0, 0.0);
+        for paint in PAINTS {
+            for visibility_m in VISIBILITIES_M {
+                let case = Self::case(VehicleClass::Car, paint, Plate::Clean, visibility_m);
+                let first = self.sightings(&case, &self.full)?;
+                let second = self.sightings_with_noise_of(self.plan.approaches, &case, &self.full)?;
+                for (first, second) in first.iter().zip(&second) {
+                    squares += maths::ln(first.lasting_m / second.lasting_m).powi(2);
+                    pairs += 1.0;
+                }
+            }
+        }
+        // The variance of a difference is twice the variance of each.
+        Ok(rounded((0.5 * squares / pairs).sqrt(), 1e4))
     }
 
     /// Returns the distances that the object-level sensor with these errors needs to confirm a
@@ -210,11 +242,10 @@ impl Fitter<'_> {
         Ok([TEST_RANGE_M - lasting_m, TEST_CLASS_RANGE_M - classified_m])
     }
 
-    /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's
-    /// range.
-    fn ranges(&self, errors: &FittedErrors) -> Result<(Vec<RangeGrid>, f64), StudyError> {
+    /// Returns the ranges of all classes and plates.
+    fn ranges(&self, errors: &FittedErrors) -> Result<Vec<RangeGrid>, StudyError> {
         let [delay_m, class_delay_m] = self.own_delays_m(errors)?;
-        let (mut grids, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
+        let mut grids = Vec::new();
         for (class, plate) in [
             (VehicleClass::Car, Plate::Clean),
             (VehicleClass::Car, Plate::Dirty),
@@ -228,13 +259,6 @@ impl Fitter<'_> {
                 for visibility_m in VISIBILITIES_M {
                     let approaches = self.sightings(&Self::case(class, paint, plate, visibility_m), &self.full)?;
                     let [centre_m, classified_m] = means_m(&approaches);
-                    if class == VehicleClass::Car {
-                        squares += approaches
-                            .iter()
-                            .map(|approach| maths::ln(approach.lasting_m / centre_m).powi(2))
-                            .sum::<f64>();
-                        count += approaches.len() as f64 - 1.0;
-                    }
                     let range_m = rounded(centre_m + delay_m, 10.0);
                     // A class that the full chain knows at the confirmation of the track limits
                     // nothing.
@@ -249,7 +273,7 @@ impl Fitter<'_> {
             }
             grids.push(grid);
         }
-        Ok((grids, rounded((squares / count.max(1.0)).sqrt(), 1e4)))
+        Ok(grids)
     }
 
     /// Returns the ranges of each body shape relative to the ranges of the first shape of its

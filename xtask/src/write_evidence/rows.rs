@@ -52,9 +52,9 @@ pub(super) const TWINS: [&str; 10] = [
     "traffic/trucks-alongside",
 ];
 
-/// Scenarios in which the lead vehicle brakes, with the parameter of its speed and the arms that run
-/// them. Without the braking they have no twin in the library: their drivers differ from those of
-/// [`TWINS`].
+/// Scenarios in which the lead vehicle brakes, with the parameter of its speed and the arms that
+/// run them. Without the braking they have no twin in the library: their drivers differ from those
+/// of [`TWINS`].
 const BRAKING: [(&str, &str, [&str; 2]); 3] = [
     (HEADLINE, "cruise-mps", ["acc", "mis"]),
     ("as-recorded/low-thw-overtake-as-recorded", "following-mps", ["acc", "mis"]),
@@ -183,8 +183,8 @@ pub(super) fn twins(size: Size) -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// Every scenario without its event, with object-level sensors: the collisions that its drivers have
-/// without the system, and those that the system induces.
+/// Every scenario without its event, with object-level sensors: the collisions that its drivers
+/// have without the system, and those that the system induces.
 pub(super) fn event_free(size: Size) -> Result<String, Box<dyn Error>> {
     let mut text = "`object` sensors. The arms are `acc` and `mis`; in `anchor-lead-brakes` a human drives the ego, without and \
                     with emergency braking. In the rows that say so, the lead vehicle keeps its speed instead of braking.\n\n\

@@ -40,8 +40,8 @@ const FOLDERS: [&str; 3] = ["", "ramp", TRAFFIC];
 /// The folder of the scenarios with surrounding traffic, which take longer.
 const TRAFFIC: &str = "traffic";
 
-/// The folders of scenarios that judge another function. Emergency braking beside a human driver has
-/// a page of its own.
+/// The folders of scenarios that judge another function. Emergency braking beside a human driver
+/// has a page of its own.
 const OTHER_FUNCTIONS: [&str; 2] = ["acc", "aeb"];
 
 /// Returns true if the tables have a scenario, by its path below the folder of the library.

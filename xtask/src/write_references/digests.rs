@@ -93,7 +93,8 @@ pub(crate) fn functions() -> String {
     short(&hasher)
 }
 
-/// Returns the arms that are run: the function's arms if a human drives the ego, and the two stacks otherwise.
+/// Returns the arms that are run: the function's arms if a human drives the ego, and the two stacks
+/// otherwise.
 fn arms(file: &ScenarioFile) -> [ControllerChoice; 2] {
     match file.config().function {
         Function::AebWithHuman => ControllerChoice::of_function(Function::AebWithHuman),
@@ -112,8 +113,8 @@ pub(crate) fn outcomes(file: &ScenarioFile, sensors: SensorMode, seed: u64) -> R
             let arm = Arm { controller: controller.factory(), sensors: Some(sensors) };
             // `serde_json` writes numbers so that they read back to the bit.
             let text = match run_guarded(&scenario, RunKey { seed, sample }, &arm, &mut NoObserver) {
-                // Cost, promise, what the ego meets ahead and the vehicles of the moments follow from the same motion, and
-                // have tests of their own.
+                // Cost, promise, what the ego meets ahead and the vehicles of the moments follow
+                // from the same motion, and have tests of their own.
                 Ok(outcome) => serde_json::to_string(&Outcome {
                     cost: None,
                     promise: None,

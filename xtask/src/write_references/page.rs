@@ -16,7 +16,7 @@ const MOST_TITLES: usize = 3;
 /// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear
 /// object-level sensor. A sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
-    ("range-m", [Some(150.0), Some(14.0), Some(133.9)]),
+    ("range-m", [Some(150.0), Some(14.0), Some(128.8)]),
     ("half-angle-deg", [Some(45.0), None, Some(66.5)]),
     ("range-sd-m", [Some(0.1), Some(0.1), None]),
     ("lateral-sd-m", [Some(0.3), Some(0.15), None]),

@@ -22,14 +22,15 @@ const STEPS: usize = 3;
 /// A place of the line.
 #[derive(Clone, Copy, Debug, Default)]
 struct Knot {
-    /// Position of the point of the line, ahead and to the left of the lens, in the direction of the
-    /// road at the lens (m).
+    /// Position of the point of the line, ahead and to the left of the lens, in the direction of
+    /// the road at the lens (m).
     at_m: [f32; 2],
     /// Cosine and sine of the direction of the line.
     direction: [f32; 2],
     /// Curvature at d = 0 (1/m).
     curvature_per_m: f32,
-    /// Length of the line d = 0 for each metre of s: a reversed road measures s along its other edge.
+    /// Length of the line d = 0 for each metre of s: a reversed road measures s along its other
+    /// edge.
     scale: f32,
 }
 
@@ -104,8 +105,8 @@ mod tests {
 
     use super::*;
 
-    /// A line, a clothoid to an arc to the left, a clothoid to an arc to the right, and a jump back to
-    /// a line.
+    /// A line, a clothoid to an arc to the left, a clothoid to an arc to the right, and a jump back
+    /// to a line.
     fn road() -> Road {
         let points = [[-300.0, 0.0], [-200.0, 0.0025], [-150.0, 0.0025], [0.0, -0.002], [80.0, -0.002], [80.0, 0.0]];
         let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });

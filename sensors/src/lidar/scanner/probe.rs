@@ -3,8 +3,8 @@
 //!
 //! The sweep leaves the returns of the bare road out, because the detector would discard them. For
 //! a few columns they are measured here, with the noise that the complete scan has, and with the
-//! faults of the sensor. The faultless sensor has the pose that the ego believes the sensor to have,
-//! above a level, dry road of the darkest usual asphalt.
+//! faults of the sensor. The faultless sensor has the pose that the ego believes the sensor to
+//! have, above a level, dry road of the darkest usual asphalt.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -106,7 +106,8 @@ impl Scanner {
         }
     }
 
-    /// Returns the surface of a level road, as a sensor sees it that is mounted as the ego believes.
+    /// Returns the surface of a level road, as a sensor sees it that is mounted as the ego
+    /// believes.
     fn expected_road(&self, sweep: &Sweep) -> Face {
         let height_m = sweep.pose.sensor_z_m();
         Face {

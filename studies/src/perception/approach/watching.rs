@@ -4,7 +4,7 @@
 use closecall_sensors::{Perception, Scene, SensorError, Sensors};
 use closecall_traffic::{CONTROL_STEP, Road, Track, TrackStatus, maths};
 
-use super::{APPEARS_AT_M, Address, GAPS_M, Traffic, WAIT_STEPS, build, confirmed, errors, follow, nearest};
+use super::{APPEARS_AT_M, Address, Course, GAPS_M, Traffic, WAIT_STEPS, build, confirmed, errors, follow, nearest};
 use crate::perception::cases::Case;
 
 /// Fewest steps that the sensors watch an empty road before a vehicle appears.
@@ -73,7 +73,8 @@ pub(crate) fn steps(
     near_m: f64,
 ) -> Result<Vec<Step>, SensorError> {
     let mut steps = Vec::new();
-    follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, traffic| {
+    let course = Course { case, sensors, road, at, noise: at, lane_keeping_m: 0.0, from_m: GAPS_M[0] };
+    follow(&course, |gap_m, track, traffic| {
         let seen = track.map(|track| seen(track, traffic));
         steps.push(Step { gap_m, seen });
         gap_m >= near_m
