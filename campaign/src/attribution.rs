@@ -2,10 +2,11 @@
 //!
 //! An ego that is always slower has a longer gap ahead, and prevents collisions without looking
 //! back. Such an ego also slows down if nobody is behind, or if the vehicles behind it do not
-//! approach. In scenarios with the requirement `MIS-9`, some samples therefore run twice more, while
-//! nothing happens ahead: without the vehicles that start behind the ego, and with these vehicles at
-//! no more than the speed of the ego. If the ego slows down in such a run by more than the baseline
-//! does, it misses the requirement. The time at which it begins to slow down does not matter.
+//! approach. In scenarios with the requirement `MIS-9`, some samples therefore run twice more,
+//! while nothing happens ahead: without the vehicles that start behind the ego, and with these
+//! vehicles at no more than the speed of the ego. If the ego slows down in such a run by more than
+//! the baseline does, it misses the requirement. The time at which it begins to slow down does not
+//! matter.
 
 use closecall_simulation::RunKey;
 use closecall_traffic::statistics::format::percent;
@@ -28,8 +29,8 @@ const MOST: f64 = 0.05;
 /// Confidence of the bound on that share.
 const CONFIDENCE: f64 = 0.95;
 
-/// Returns true if a sample of a scenario with these requirements runs again with nobody coming from
-/// behind.
+/// Returns true if a sample of a scenario with these requirements runs again with nobody coming
+/// from behind.
 pub(crate) fn includes(requirements: &[String], key: RunKey) -> bool {
     CheckPlan::new(SHARE, CheckPlan::AT_MOST).is_ok_and(|plan| plan.includes(key))
         && requirements.iter().any(|mark| mark == REQUIREMENT)

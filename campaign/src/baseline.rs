@@ -131,7 +131,8 @@ impl Baseline {
     /// Reads a file that [`Baseline::write`] has written.
     ///
     /// # Errors
-    /// [`FolderError`] if the file cannot be read, has another version of the layout, or was edited.
+    /// [`FolderError`] if the file cannot be read, has another version of the layout, or was
+    /// edited.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
         let text = read_text(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
         let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };

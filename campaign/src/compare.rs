@@ -203,8 +203,8 @@ pub enum Regression {
     None,
     /// Samples end in an error that had an outcome. This takes precedence over [`Self::Worse`].
     NewErrors,
-    /// All samples of some scenario end in an error, as in the earlier campaign: nothing is compared
-    /// there.
+    /// All samples of some scenario end in an error, as in the earlier campaign: nothing is
+    /// compared there.
     NotCompared,
     /// More samples fail than allowed, or a margin has shrunk.
     Worse,

@@ -87,8 +87,8 @@ impl FittedParameter {
 }
 
 impl Fitted {
-    /// Reads a file that `closecall traffic fit` wrote, or a scenario, by its file or by its name in
-    /// the library, whose parameters come from one.
+    /// Reads a file that `closecall traffic fit` wrote, or a scenario, by its file or by its name
+    /// in the library, whose parameters come from one.
     ///
     /// # Errors
     /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.
@@ -106,8 +106,8 @@ impl Fitted {
         for (name, config) in &parameters.0 {
             all.extend(FittedParameter::of(name.as_str(), config)?);
         }
-        // Within a quantity, parameters without a cut come first. Among these, the parameter that has
-        // the name of the quantity comes first.
+        // Within a quantity, parameters without a cut come first. Among these, the parameter that
+        // has the name of the quantity comes first.
         all.sort_by_key(|parameter| {
             (parameter.quantity, parameter.cut.is_some(), parameter.name != parameter.quantity.name())
         });
@@ -188,8 +188,8 @@ pub fn drift(fitted: &Fitted, files: &[SmoothedFile], seed: u64) -> Drift {
     drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &p_value)
 }
 
-/// A function that returns the probability of a distance larger than the distance of these sorted new
-/// values.
+/// A function that returns the probability of a distance larger than the distance of these sorted
+/// new values.
 type PValue<'a> = dyn Fn(&str, &Summary, &[f64]) -> f64 + 'a;
 
 /// The result of one test.

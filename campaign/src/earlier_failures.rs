@@ -83,7 +83,8 @@ impl EarlierFailures {
         for record in folder.records()? {
             push(&record?);
         }
-        // A campaign that has ended at a failure that came first has it here, and not in its journal.
+        // A campaign that has ended at a failure that came first has it here, and not in its
+        // journal.
         let waiting = folder.file(AHEAD);
         let place = |record: &Record| {
             let work = manifest.scenarios.iter().position(|scenario| scenario.name == record.scenario)?;

@@ -187,8 +187,8 @@ impl Campaign {
     }
 
     /// Runs samples before their turn: up to 10,000 samples that failed in an earlier campaign, in
-    /// the order of the plan. A sample does not run again if the folder's journal has its record, or
-    /// if an interrupted campaign has run it before its turn.
+    /// the order of the plan. A sample does not run again if the folder's journal has its record,
+    /// or if an interrupted campaign has run it before its turn.
     ///
     /// `on_record` receives every record, first the records of the interrupted campaign. If it
     /// breaks, the campaign ends after that record: [`Self::run_after`] then runs no sample.

@@ -3,10 +3,10 @@
 //!
 //! Two failures are of one kind if they have the same controller, the same name, and the same
 //! message apart from its numbers, with the plural that goes with them, and its names of temporary
-//! files: measured values, times, counts, steps, process numbers and addresses differ from sample to
-//! sample. Only the numbers that name an error tell kinds apart:
-//! error codes, exit statuses, signals and lines of a source file. The list is bounded, whatever the
-//! controllers write: the failures beyond it are counted as others.
+//! files: measured values, times, counts, steps, process numbers and addresses differ from sample
+//! to sample. Only the numbers that name an error tell kinds apart: error codes, exit statuses,
+//! signals and lines of a source file. The list is bounded, whatever the controllers write: the
+//! failures beyond it are counted as others.
 
 use std::fmt;
 

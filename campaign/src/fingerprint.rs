@@ -31,7 +31,8 @@ pub struct FileHash {
     pub blake3: String,
 }
 
-/// The beginning of the command of a perception program, which tells it from a controller with the same command.
+/// The beginning of the command of a perception program, which tells it from a controller with the
+/// same command.
 const PERCEPTION: &str = "sensors.perception=";
 
 /// What identifies a controller or a perception program that runs as a process.
@@ -76,8 +77,8 @@ impl Fingerprint {
         }
     }
 
-    /// Returns the fingerprint of a perception program. It is started once and greeted as in a run of `scenario`. One that cannot be
-    /// greeted has no identity.
+    /// Returns the fingerprint of a perception program. It is started once and greeted as in a run
+    /// of `scenario`. One that cannot be greeted has no identity.
     pub fn of_program(program: &ProgramSettings, scenario: Option<&Scenario>) -> Self {
         let stated = scenario.and_then(|scenario| identify_program(program, scenario)).unwrap_or_default();
         let (identity, open_files) = stated;
@@ -149,7 +150,8 @@ fn hashes(files: Vec<(String, PathBuf)>) -> Vec<FileHash> {
     files.into_iter().map(hash).collect()
 }
 
-/// Returns the files that a perception program names, each as it is named and with its path: the files of its command, or its library.
+/// Returns the files that a perception program names, each as it is named and with its path: the
+/// files of its command, or its library.
 pub fn program_files(program: &ProgramSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     match program.kind {
         ProgramKind::Exec => named_files(&command_settings(program), folder),
@@ -168,8 +170,9 @@ pub(crate) fn command_settings(program: &ProgramSettings) -> ExecSettings {
     ExecSettings { command: command.to_owned(), timeout_ms, memory_mib }
 }
 
-/// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows
-/// `=` in a word. The program is looked for in `PATH` if it is named without a folder.
+/// Returns the existing files that the command names, each as it is named and with its path: whole
+/// words, and what follows `=` in a word. The program is looked for in `PATH` if it is named
+/// without a folder.
 pub fn named_files(settings: &ExecSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     let words = settings.words().unwrap_or_default();
     let mut files: Vec<(String, PathBuf)> = Vec::new();

@@ -11,10 +11,10 @@
 //! Fast samples, in [`FAST_SAMPLES`](crate::folder::FAST_SAMPLES), have no files that are made from
 //! their journal. The campaign to which they belong resumes them.
 //!
-//! The command that resumes a campaign stands in its manifest. It is shown only if the folder is the
-//! user's own (see the module `trust`): another author may have written any command there. If the
-//! command ran in another folder than the user is in, it has to run there again, because its paths
-//! may be relative.
+//! The command that resumes a campaign stands in its manifest. It is shown only if the folder is
+//! the user's own (see the module `trust`): another author may have written any command there. If
+//! the command ran in another folder than the user is in, it has to run there again, because its
+//! paths may be relative.
 //!
 //! The commands that read a folder make the same checks of its records: see
 //! [`Folder::records`](crate::folder::Folder::records).
@@ -146,8 +146,8 @@ impl Integrity {
     }
 }
 
-/// Returns the words that say how the campaign is resumed in this folder, which may have been moved.
-/// Fast samples are resumed with the campaign to which they belong.
+/// Returns the words that say how the campaign is resumed in this folder, which may have been
+/// moved. Fast samples are resumed with the campaign to which they belong.
 fn resumption(folder: &Folder, manifest: &Manifest, command_for: CommandFor) -> String {
     let path = folder.campaign_of_fast_samples().unwrap_or_else(|| folder.path().to_owned());
     if folder.is_own().is_ok_and(|is_own| is_own) {

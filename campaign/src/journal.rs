@@ -173,9 +173,9 @@ impl Entries {
     }
 }
 
-/// Returns the lines of a journal that are copies of others, counted from 1. Of a line that is there
-/// more than once, the copy in the order of the plan stays. `order` returns the place of a record in
-/// the plan, `None` for a record of another campaign.
+/// Returns the lines of a journal that are copies of others, counted from 1. Of a line that is
+/// there more than once, the copy in the order of the plan stays. `order` returns the place of a
+/// record in the plan, `None` for a record of another campaign.
 ///
 /// # Errors
 /// The error of the operating system if the file cannot be read.

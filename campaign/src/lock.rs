@@ -85,8 +85,8 @@ impl Lock {
     }
 }
 impl Drop for Lock {
-    /// Unlocks the file. Closing it alone would not: a process that another thread is starting holds
-    /// the open file, too, until its own program begins.
+    /// Unlocks the file. Closing it alone would not: a process that another thread is starting
+    /// holds the open file, too, until its own program begins.
     fn drop(&mut self) {
         drop(self.file.unlock());
     }

@@ -257,9 +257,9 @@ impl Manifest {
     }
 
     /// Returns the manifest as JSON without the parts that do not affect the outcomes: the command
-    /// line, whether it named a folder or a seed, the working folder, the paths of the scenario files,
-    /// the partition, and the build of the program. It is the same for a campaign that ran in one go,
-    /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
+    /// line, whether it named a folder or a seed, the working folder, the paths of the scenario
+    /// files, the partition, and the build of the program. It is the same for a campaign that ran
+    /// in one go, in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {
         let mut whole = self.whole();
         if let Some(end) = whole.closecall_version.find('+') {
@@ -304,7 +304,8 @@ impl Manifest {
         fingerprint::differences(&there, &now)
     }
 
-    /// Returns the perception programs that the scenarios name, each once. They run in the folder of the controllers.
+    /// Returns the perception programs that the scenarios name, each once. They run in the folder
+    /// of the controllers.
     pub fn programs(&self) -> Vec<ProgramSettings> {
         let mut programs: Vec<ProgramSettings> = Vec::new();
         for scenario in &self.scenarios {

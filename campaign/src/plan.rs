@@ -297,8 +297,9 @@ impl Plan {
     }
 }
 
-/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none: it would be the baseline under another name; and one in
-/// which a human drives, for a scenario whose ego has no human driver.
+/// Refuses a controller that is a margin increase system for a scenario whose ego stack has none:
+/// it would be the baseline under another name; and one in which a human drives, for a scenario
+/// whose ego has no human driver.
 ///
 /// # Errors
 /// [`PlanError::WithoutMis`] or [`PlanError::WithoutHuman`] with the first such controller.

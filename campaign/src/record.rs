@@ -49,8 +49,8 @@ impl NobodyComing {
         Self { deficit_mps: self.deficit_mps.zip(other.deficit_mps).map(|(one, another)| one.max(another)) }
     }
 
-    /// Returns true if the ego slowed down by more than it does with the baseline, or its controller
-    /// failed.
+    /// Returns true if the ego slowed down by more than it does with the baseline, or its
+    /// controller failed.
     pub fn is_slowed(self, baseline: Option<Self>) -> bool {
         let baseline_mps = baseline.and_then(|baseline| baseline.deficit_mps).unwrap_or(0.0);
         self.deficit_mps.is_none_or(|deficit_mps| deficit_mps > SLOWED_MPS + baseline_mps.max(0.0))

@@ -35,9 +35,9 @@ struct FileStudy {
     hash: String,
 }
 
-/// Studies trajectory files, and calls `warn` with what a reader of the results has to know of them.
-/// Returns the result of each file, and the result of all files together; `None` if there are no
-/// files.
+/// Studies trajectory files, and calls `warn` with what a reader of the results has to know of
+/// them. Returns the result of each file, and the result of all files together; `None` if there are
+/// no files.
 ///
 /// # Errors
 /// [`RobustnessError`] if a file cannot be used, or if the files cannot be studied together.

@@ -94,8 +94,8 @@ impl Samples for Work {
 }
 
 impl Work {
-    /// Runs one sample in one arm in this thread. `on_outcome` gets the result before the checks and
-    /// the run without vehicles behind, if there are any.
+    /// Runs one sample in one arm in this thread. `on_outcome` gets the result before the checks
+    /// and the run without vehicles behind, if there are any.
     fn run_here(&self, sample: u64, arm: &Arm, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();

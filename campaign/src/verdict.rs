@@ -45,8 +45,8 @@ pub enum Verdict {
     /// The samples do not decide a gate.
     #[serde(rename = "INCONCLUSIVE")]
     Inconclusive,
-    /// No gate and no requirement was checked, or in some scenario none on the system under test, or
-    /// that system was not available or never acted.
+    /// No gate and no requirement was checked, or in some scenario none on the system under test,
+    /// or that system was not available or never acted.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
     /// A setting, a gate or the baseline of the command line weakened the criteria of a file.
@@ -134,8 +134,8 @@ pub struct Judgement {
     pub decision: Decision,
     /// Every reason for it, in sentences. The reasons that decide come first, then remarks.
     pub reasons: Vec<String>,
-    /// The reasons that decide nothing and are about one scenario each: what happened as expected, what extrapolates.
-    /// There may be one for each scenario, so that a report folds them.
+    /// The reasons that decide nothing and are about one scenario each: what happened as expected,
+    /// what extrapolates. There may be one for each scenario, so that a report folds them.
     pub background: Vec<String>,
     /// Every gate and every check of a requirement, with its answer.
     pub gates: Vec<GateResult>,

@@ -36,8 +36,8 @@ const WINDOW_PER_WORKER: usize = 128;
 /// Time that running samples have to end after a stop was requested. Those that take longer are run
 /// again on resuming.
 const STOP_TIMEOUT: Duration = Duration::from_secs(5);
-/// Time that the threads of a pool have to end what they have started: the last process may be given
-/// half a second.
+/// Time that the threads of a pool have to end what they have started: the last process may be
+/// given half a second.
 const END_TIMEOUT: Duration = Duration::from_secs(2);
 /// Interval at which the time limit of running samples is checked.
 const WATCH_EVERY: Duration = Duration::from_millis(50);
@@ -315,8 +315,8 @@ impl<S: Samples> WorkerPool<S> {
         }
     }
 
-    /// Ends the threads, if all runs are done, and waits a short time until each has ended what it has
-    /// started. Threads of a pool that ends early end by themselves.
+    /// Ends the threads, if all runs are done, and waits a short time until each has ended what it
+    /// has started. Threads of a pool that ends early end by themselves.
     fn end(self) {
         if self.returned != self.submitted || self.stop.is_set() {
             return;

@@ -125,8 +125,9 @@ impl std::fmt::Debug for BoundaryPlan {
 const BUDGET: usize = 60;
 
 impl BoundaryPlan {
-    /// Returns the plan of a boundary of `event` in `file` along two parameters. The last controller is
-    /// the one under test; one before it is the baseline, which runs only for an event of the baseline.
+    /// Returns the plan of a boundary of `event` in `file` along two parameters. The last
+    /// controller is the one under test; one before it is the baseline, which runs only for an
+    /// event of the baseline.
     ///
     /// # Errors
     /// [`BoundaryError`] if the parameters or the event cannot be used.
@@ -158,7 +159,8 @@ impl BoundaryPlan {
         Ok(Self { budget: BUDGET, seed: 0, sample: 0, workers: Workers::default(), file, axes, event, arms })
     }
 
-    /// Runs the points. `None` if `stop` has ended the runs early. `on_run` is called after each point.
+    /// Runs the points. `None` if `stop` has ended the runs early. `on_run` is called after each
+    /// point.
     ///
     /// # Errors
     /// [`BoundaryError::Workers`] if no threads can be started.
@@ -180,7 +182,8 @@ impl BoundaryPlan {
         Ok(Some(Boundary::new(self, &searched, &values, errors)))
     }
 
-    /// Returns the value of the number in a run; `None` if the run ended in an error or does not have it.
+    /// Returns the value of the number in a run; `None` if the run ended in an error or does not
+    /// have it.
     fn value(&self, record: &Record, errors: &mut RunErrors) -> Option<f64> {
         let failures: Vec<&SampleFailure> = record.arms.iter().filter_map(|arm| arm.result.as_ref().err()).collect();
         errors.points += u64::from(!failures.is_empty());
@@ -229,7 +232,8 @@ fn continuous(expression: EventExpression) -> Result<Event, BoundaryError> {
     }
 }
 
-/// Returns the arms that the event needs: the one under test, and the baseline if the event is of it.
+/// Returns the arms that the event needs: the one under test, and the baseline if the event is of
+/// it.
 fn arms_of(
     event: Event,
     controllers: &[ControllerChoice],

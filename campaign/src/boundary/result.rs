@@ -62,8 +62,8 @@ pub struct Surveyed {
     pub map: Map,
     /// Each run predicted from the others.
     pub check: LeaveOneOut,
-    /// Standard deviation with which single runs scatter about the surface, in the unit of the number.
-    /// Slices, area and map describe the surface, and leave it out.
+    /// Standard deviation with which single runs scatter about the surface, in the unit of the
+    /// number. Slices, area and map describe the surface, and leave it out.
     pub noise_sd: f64,
     /// The reasons to doubt the surface.
     pub doubts: Vec<Doubt>,

@@ -5,7 +5,8 @@
 
 use super::surface::{Surface, Z_95};
 
-/// Number of first runs, which fill the rectangle: ten for each parameter (Loeppky, Sacks and Welch 2009).
+/// Number of first runs, which fill the rectangle: ten for each parameter (Loeppky, Sacks and Welch
+/// 2009).
 pub const START_RUNS: usize = 20;
 /// Smallest number of runs: an assumption; ten runs beside the first ones follow a simple boundary.
 pub const SMALLEST_BUDGET: u64 = 30;
@@ -59,8 +60,8 @@ pub(super) fn grid() -> Vec<[f64; 2]> {
     coordinates(SIDE).flat_map(|x| coordinates(SIDE).map(move |y| [x, y])).collect()
 }
 
-/// Runs up to `budget` points of the unit square. `evaluate` returns the margins of points, or `None`
-/// to end the search without a result.
+/// Runs up to `budget` points of the unit square. `evaluate` returns the margins of points, or
+/// `None` to end the search without a result.
 ///
 /// # Errors
 /// The error of `evaluate`.
@@ -88,9 +89,9 @@ pub(super) fn search<E>(
     Ok(Some(searched))
 }
 
-/// Returns the points whose sign is most uncertain: 1.96 standard deviations less the distance of the
-/// mean from 0 are largest (Bryan et al. 2005). Each point is believed to have the predicted margin
-/// before the next one is chosen (Ginsbourger, Le Riche and Carraro 2010).
+/// Returns the points whose sign is most uncertain: 1.96 standard deviations less the distance of
+/// the mean from 0 are largest (Bryan et al. 2005). Each point is believed to have the predicted
+/// margin before the next one is chosen (Ginsbourger, Le Riche and Carraro 2010).
 fn straddling(mut surface: Surface, points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
     let is_run = |candidate: &[f64; 2]| {
         points.iter().any(|point| (0..2).all(|axis| (point[axis] - candidate[axis]).abs() < SAME))

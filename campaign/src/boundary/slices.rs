@@ -6,8 +6,8 @@ use super::surface::{Predicted, Surface};
 
 /// Number of values of the first parameter.
 const SLICES: usize = 21;
-/// Number of values of the second parameter at which a slice is predicted. An interval ends at one of
-/// them, outside the band.
+/// Number of values of the second parameter at which a slice is predicted. An interval ends at one
+/// of them, outside the band.
 const STEPS: usize = 401;
 
 /// The boundary at one value of the first parameter. All values are in the units of the parameters.

@@ -5,19 +5,20 @@
 //!  margins ─▶ divided by their standard deviation  ┴▶ Matérn kernel, constant mean, noise ─▶ mean, standard deviation
 //! ```
 //!
-//! The kernel is Matérn's with ν = 3/2: its functions have a slope, but may bend sharply, as a margin
-//! does where another vehicle or another rule begins to decide. `friedrich` fits its length and its
-//! amplitude by the likelihood. It fits neither the noise of a kernel that it rescales nor a length
-//! for each parameter, and its `likelihood` replaces a determinant by the product of the diagonal. So
-//! noise and ratio are chosen from short lists, by the predictions of runs that are left out.
+//! The kernel is Matérn's with ν = 3/2: its functions have a slope, but may bend sharply, as a
+//! margin does where another vehicle or another rule begins to decide. `friedrich` fits its length
+//! and its amplitude by the likelihood. It fits neither the noise of a kernel that it rescales nor
+//! a length for each parameter, and its `likelihood` replaces a determinant by the product of the
+//! diagonal. So noise and ratio are chosen from short lists, by the predictions of runs that are
+//! left out.
 
 use closecall_traffic::maths;
 use friedrich::gaussian_process::GaussianProcess;
 use friedrich::kernel::Matern1;
 use friedrich::prior::ConstantPrior;
 
-/// Fewest runs for which a surface is fitted: an assumption, 5 for each parameter; a surface of fewer
-/// says little more than its runs.
+/// Fewest runs for which a surface is fitted: an assumption, 5 for each parameter; a surface of
+/// fewer says little more than its runs.
 pub(super) const FEWEST: usize = 10;
 
 /// Standard deviations of the noise with which a fit begins, as shares of the standard deviation of
@@ -123,7 +124,8 @@ impl Shape {
         (0..points.len()).map(without).collect()
     }
 
-    /// Returns the logarithm of the probability density of all runs, each predicted from the others.
+    /// Returns the logarithm of the probability density of all runs, each predicted from the
+    /// others.
     fn score(&self, points: &[[f64; 2]], values: &[f64]) -> f64 {
         let density = |(Predicted { mean, sd }, value): (Predicted, &f64)| {
             let deviation = (value - mean) / sd;
@@ -207,8 +209,8 @@ impl Surface {
         self.in_unit(predict(&self.process, self.shape.stretched(points), 0.0))
     }
 
-    /// Returns the standard deviation with which single runs scatter about the surface, in the unit of
-    /// the margin. [`Self::predict`] does not contain it, [`Self::leave_one_out`] does.
+    /// Returns the standard deviation with which single runs scatter about the surface, in the unit
+    /// of the margin. [`Self::predict`] does not contain it, [`Self::leave_one_out`] does.
     pub(super) fn noise_sd(&self) -> f64 {
         self.shape.noise.abs() * self.scale
     }

@@ -7,8 +7,8 @@ use super::plan::FrontierPlan;
 use crate::ledger::{Pairs, Tally};
 use crate::sensitivity::RunErrors;
 
-/// Difference of the speed lost below which two combinations count as equal (m/s): the last digit of
-/// the reports.
+/// Difference of the speed lost below which two combinations count as equal (m/s): the last digit
+/// of the reports.
 const SPEED_LOST_STEP_MPS: f64 = 0.01;
 
 /// The result of all combinations.
@@ -54,8 +54,8 @@ pub struct Point {
     /// the baseline (m/s); `None` for fewer than two samples.
     pub speed_lost_mps: Option<Estimate>,
     /// True if the combination is Pareto-optimal: no other combination is better in one of
-    /// prevented, induced and speed lost, and at least as good in the other two. The speed lost counts
-    /// in steps of 0.01 m/s, as it is reported.
+    /// prevented, induced and speed lost, and at least as good in the other two. The speed lost
+    /// counts in steps of 0.01 m/s, as it is reported.
     pub is_optimal: bool,
 }
 
@@ -95,8 +95,9 @@ impl Point {
         Some([-value(self.prevented)?, value(self.induced)?, lost_steps])
     }
 
-    /// Returns the number of samples that are induced or collide in both arms, although only vehicles
-    /// other than the ego collide in the arm under test. They are no collisions of the ego.
+    /// Returns the number of samples that are induced or collide in both arms, although only
+    /// vehicles other than the ego collide in the arm under test. They are no collisions of the
+    /// ego.
     pub fn of_others(&self) -> u64 {
         self.pairs.induced_of_others + self.pairs.both_of_others
     }

@@ -11,8 +11,8 @@ use crate::record::{ArmRecord, Record};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Course {
     /// Whether everything that the scenario expects happened, in every arm. A run that the ego's
-    /// collision ended counts as one in which everything happened. Its further course is unknown, and
-    /// the collision itself is no pass.
+    /// collision ended counts as one in which everything happened. Its further course is unknown,
+    /// and the collision itself is no pass.
     pub(crate) happened: bool,
     /// Whether the system under test acted: it slowed the ego for a vehicle behind, or moved it
     /// otherwise than the baseline.

@@ -135,8 +135,8 @@ impl Certainty {
     /// above for `<=`. Returns `None` if there are too few values.
     fn of_percentile(sorted: &[f64], percent: f64, operator: Operator) -> Option<Self> {
         let (count, p) = (sorted.len() as u64, 0.01 * percent);
-        // The value of rank r is at most the percentile if at least r values are, and it is at least
-        // the percentile if at most r − 1 values are below.
+        // The value of rank r is at most the percentile if at least r values are, and it is at
+        // least the percentile if at most r − 1 values are below.
         let rank = match operator {
             Operator::AtLeast => {
                 let fails = first_that_holds(1, count, |rank| at_least(rank, count, p) < CONFIDENCE);
@@ -165,14 +165,15 @@ pub struct Evaluation {
     pub hits: u64,
     /// Whether the bound is satisfied.
     pub answer: Answer,
-    /// Number of samples of the campaign that decide the gate if further samples are like these, with
-    /// those that do not satisfy the condition; `None` if the gate is decided, or if more than 10⁸
-    /// would be needed.
+    /// Number of samples of the campaign that decide the gate if further samples are like these,
+    /// with those that do not satisfy the condition; `None` if the gate is decided, or if more than
+    /// 10⁸ would be needed.
     pub needed: Option<u64>,
 }
 
 impl Evaluation {
-    /// Returns the result of a gate on a coverage item or cross: its share and the samples in its bins, if the scenario has it.
+    /// Returns the result of a gate on a coverage item or cross: its share and the samples in its
+    /// bins, if the scenario has it.
     pub(super) fn of_coverage(expression: &Expression, covered: Option<(f64, u64)>) -> Self {
         let holds = |share: f64| expression.operator.holds(share, expression.bound);
         let answer = match covered {
@@ -552,7 +553,8 @@ mod tests {
         assert_eq!(bound("p1(min_ttc_rear_s) >= 1", 298), None, "the smallest of 298 may be above");
         assert_eq!(bound("p99(max_jerk_mps3) <= 5", 299), Some(Certainty::PercentileBound(299.0)));
         assert_eq!(bound("p99(max_jerk_mps3) <= 5", 298), None);
-        // The median of 100 values from 200 to 299, of ranks 42 and 59 (binomial distribution with 1/2).
+        // The median of 100 values from 200 to 299, of ranks 42 and 59 (binomial distribution with
+        // 1/2).
         assert_eq!(bound("p50(max_jerk_mps3) >= 5", 100), Some(Certainty::PercentileBound(241.0)));
         assert_eq!(bound("p50(max_jerk_mps3) <= 5", 100), Some(Certainty::PercentileBound(258.0)));
         assert_eq!(bound("p100(max_jerk_mps3) <= 5", 299), None, "no sample shows the largest value of all");

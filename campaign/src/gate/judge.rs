@@ -59,7 +59,8 @@ struct Judged {
     extrapolations: Vec<String>,
     /// What the samples cover.
     coverage: CoverageCounter,
-    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or moved it otherwise than the baseline.
+    /// Samples in which the system under test acted: it slowed the ego for a vehicle behind, or
+    /// moved it otherwise than the baseline.
     acted: u64,
 }
 

@@ -43,12 +43,12 @@ impl ProjectFile {
     /// there is none.
     ///
     /// # Errors
-    /// [`ProjectError`] if the file cannot be read, has an unknown key or an invalid criterion, or two
-    /// criteria that contradict each other.
+    /// [`ProjectError`] if the file cannot be read, has an unknown key or an invalid criterion, or
+    /// two criteria that contradict each other.
     pub fn find(folder: &Path) -> Result<Option<Self>, ProjectError> {
         for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
-            // A file that cannot be read may hold gates: they must not be left out. A link that leads
-            // nowhere is one, for example into a submodule that is not checked out.
+            // A file that cannot be read may hold gates: they must not be left out. A link that
+            // leads nowhere is one, for example into a submodule that is not checked out.
             match path.symlink_metadata() {
                 Ok(_) => return Self::read(&path).map(Some),
                 Err(error)

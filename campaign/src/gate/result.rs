@@ -68,8 +68,8 @@ impl GateResult {
         matches!(self.evaluation.answer, Answer::Met | Answer::Missed)
     }
 
-    /// Returns true if the gate judges the arm under test. A gate on the baseline alone does not, and a
-    /// gate that is not checked judges nothing.
+    /// Returns true if the gate judges the arm under test. A gate on the baseline alone does not,
+    /// and a gate that is not checked judges nothing.
     pub fn judges_tested(&self) -> bool {
         self.standing() != Standing::NotChecked && !self.expression.quantity.is_of_baseline()
     }
@@ -125,7 +125,8 @@ pub(crate) fn undecided(reason: OpenReason, needed: Option<u64>) -> String {
     format!("{}{more}", reason.text())
 }
 
-/// Returns a number of samples with its first two digits, rounded up: the rest of it rests on a share that is not known better.
+/// Returns a number of samples with its first two digits, rounded up: the rest of it rests on a
+/// share that is not known better.
 pub(crate) fn rounded_up(samples: u64) -> u64 {
     let step = samples.checked_ilog10().and_then(|digits| digits.checked_sub(1)).map_or(1, |digits| 10_u64.pow(digits));
     samples.div_ceil(step) * step

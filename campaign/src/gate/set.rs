@@ -139,8 +139,8 @@ impl GateSet {
         self.specs.retain(|gate| !(gate.is_of_preset() && gate.is_weaker_than(expression)));
     }
 
-    /// Returns the gate on the probability of a collision that replaces a gate of a file and demands
-    /// less, in words.
+    /// Returns the gate on the probability of a collision that replaces a gate of a file and
+    /// demands less, in words.
     pub(super) fn weaker_than_probability(&self, gate: &ProbabilityGate) -> Option<String> {
         let spec = self.probability.as_ref()?;
         let is_kept = spec.gate.max() <= gate.max() && spec.gate.confidence() >= gate.confidence();

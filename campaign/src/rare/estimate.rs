@@ -67,8 +67,9 @@ impl Mean {
     }
 
     /// Returns a one-sided upper bound of the mean of values from 0 to `largest` that holds for any
-    /// distribution of them: the mean need not be nearly normal. It is wide (A. Maurer and M. Pontil,
-    /// *Empirical Bernstein Bounds and Sample-Variance Penalization*, COLT 2009, theorem 4).
+    /// distribution of them: the mean need not be nearly normal. It is wide (A. Maurer and M.
+    /// Pontil, *Empirical Bernstein Bounds and Sample-Variance Penalization*, COLT 2009, theorem
+    /// 4).
     pub fn upper_bound_of_bounded(&self, largest: f64, confidence: f64) -> f64 {
         let log = ln(2.0 / (1.0 - confidence));
         // The term of the variance is √(2·V·log/n), and V/n is the square of the standard error.

@@ -147,7 +147,8 @@ pub struct RareFolder {
 }
 
 impl RareFolder {
-    /// Locks a folder: a new or empty one, or with `resume` the one of the same campaign, whose budget may grow.
+    /// Locks a folder: a new or empty one, or with `resume` the one of the same campaign, whose
+    /// budget may grow.
     ///
     /// # Errors
     /// [`FolderError`] if the folder cannot be used.

@@ -6,10 +6,10 @@
 //! ```
 //!
 //! Only importance sampling has parts. Its searches and its pilot adapt, each level to the level
-//! before, and every part repeats them: they depend on the seed alone. The last runs are independent
-//! of each other. Each part runs its share of them, by their numbers. The merged journal has each run
-//! once, in the order of the numbers, and the method goes through it as through the journal of one
-//! machine. So the weights, the sums and the result have the same bits.
+//! before, and every part repeats them: they depend on the seed alone. The last runs are
+//! independent of each other. Each part runs its share of them, by their numbers. The merged
+//! journal has each run once, in the order of the numbers, and the method goes through it as
+//! through the journal of one machine. So the weights, the sums and the result have the same bits.
 //!
 //! Subset simulation has no parts: the number of its repetitions follows from the first of them,
 //! which are most of its runs. Nor has a search, which ends with the first event.
@@ -46,8 +46,8 @@ pub struct RareParts {
 }
 
 impl RareParts {
-    /// Opens the folders of all parts of a campaign, in any order. Returns `None` if no folder samples
-    /// a rare event.
+    /// Opens the folders of all parts of a campaign, in any order. Returns `None` if no folder
+    /// samples a rare event.
     ///
     /// # Errors
     /// [`MergeError`] if a folder cannot be read, if a part is of another campaign, duplicate, or
@@ -117,8 +117,8 @@ impl RareParts {
     }
 
     /// Writes the manifest and the journal of the whole campaign into a new folder. Call
-    /// [`Self::estimate`] first. With `resume`, the folder may hold the same campaign, which is written
-    /// anew.
+    /// [`Self::estimate`] first. With `resume`, the folder may hold the same campaign, which is
+    /// written anew.
     ///
     /// # Errors
     /// [`MergeError`] if the folder cannot be written, or is not new.

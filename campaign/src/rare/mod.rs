@@ -7,11 +7,11 @@
 //!                                          └────────── responses ─────────┘
 //! ```
 //!
-//! The methods, `importance`, `subset` and `search`, are pure: they know points and responses only. The rest
-//! of the module runs points as samples of a scenario (`runs`), reads how near a sample came to an
-//! event (`nearness`), and keeps a journal (`journal`). A method's next points depend on its seed
-//! and on the responses so far, never on threads or time, so that a campaign that goes on from its
-//! journal ends with the same bytes.
+//! The methods, `importance`, `subset` and `search`, are pure: they know points and responses only.
+//! The rest of the module runs points as samples of a scenario (`runs`), reads how near a sample
+//! came to an event (`nearness`), and keeps a journal (`journal`). A method's next points depend on
+//! its seed and on the responses so far, never on threads or time, so that a campaign that goes on
+//! from its journal ends with the same bytes.
 //!
 //! The runs of these methods are not independent samples of the scenario. Their results are of
 //! types of their own, which no gate and no binomial bound takes: such a bound needs an

@@ -3,8 +3,8 @@
 //! A score decides how many runs a search needs, and nothing else: no estimate and no interval
 //! depends on it. A bound of a number is its own guide. A collision of the ego is guided by its
 //! smallest gap, and `induced` and `prevented` by the smallest gap in the arm that is to collide,
-//! plus the change of velocity of a collision in the arm that is not to. A search for the first case
-//! is also led by what sets the arms apart ([`Nearness::with_contrast`]).
+//! plus the change of velocity of a collision in the arm that is not to. A search for the first
+//! case is also led by what sets the arms apart ([`Nearness::with_contrast`]).
 
 use closecall_scenarios::criteria::{EGO_COLLIDED, Event, EventExpression, Guide, Measure, PairFlag, Quantity};
 use closecall_scenarios::outcome::Outcome;
@@ -49,8 +49,8 @@ impl Nearness {
     }
 
     /// Returns the same events, to which the difference of the two arms leads as well: a sample in
-    /// which one arm keeps its distance and the other does not is nearer than a sample in which both
-    /// come equally close.
+    /// which one arm keeps its distance and the other does not is nearer than a sample in which
+    /// both come equally close.
     #[must_use]
     pub const fn with_contrast(self) -> Self {
         Self { contrasts: true, ..self }

@@ -42,8 +42,8 @@ impl RarePlan {
     /// `journal` are not run again. `on_run` is called after each run.
     ///
     /// # Errors
-    /// [`RareError`] if there is no result. The campaign can go on from its journal. A part ends with
-    /// [`RareError::PartEnds`].
+    /// [`RareError`] if there is no result. The campaign can go on from its journal. A part ends
+    /// with [`RareError::PartEnds`].
     pub fn run(
         &self,
         (index, work): (usize, &Arc<Work>),

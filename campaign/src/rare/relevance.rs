@@ -1,11 +1,11 @@
 //! Whether the runs of a rare event say anything about the system under test.
 //!
-//! A scenario states what must happen in a run for it to count (`expects`), and an event that cannot
-//! happen is rare. So a probability that is low enough is no pass if what the scenario is about did
-//! not happen, or if the system under test never acted.
+//! A scenario states what must happen in a run for it to count (`expects`), and an event that
+//! cannot happen is rare. So a probability that is low enough is no pass if what the scenario is
+//! about did not happen, or if the system under test never acted.
 //!
-//! Later runs are moved towards the event. The first runs of every method are independent samples of
-//! the scenario: only they count for the share in which something happens.
+//! Later runs are moved towards the event. The first runs of every method are independent samples
+//! of the scenario: only they count for the share in which something happens.
 
 use closecall_scenarios::Function;
 use closecall_scenarios::criteria::FlagName;

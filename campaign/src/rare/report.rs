@@ -215,14 +215,14 @@ impl RareReport {
         self.estimates.last()
     }
 
-    /// Returns true if a few runs carry the estimate, or too much of it lies where no search led. The
-    /// mean of the weights may then be far from normal, so that its interval is no evidence.
+    /// Returns true if a few runs carry the estimate, or too much of it lies where no search led.
+    /// The mean of the weights may then be far from normal, so that its interval is no evidence.
     pub fn is_doubtful(&self) -> bool {
         self.importance.as_ref().is_some_and(|details| details.is_carried_by_few() || details.outside > LARGE_OUTSIDE)
     }
 
-    /// Returns the one-sided upper bound of the probability by which a gate is judged: of a doubtful
-    /// estimate one that holds for any weights. `None` without an estimate or its bound.
+    /// Returns the one-sided upper bound of the probability by which a gate is judged: of a
+    /// doubtful estimate one that holds for any weights. `None` without an estimate or its bound.
     pub fn upper_bound(&self, confidence: f64) -> Option<f64> {
         let mean = &self.main()?.mean;
         let bound = mean.upper_bound(confidence)?;

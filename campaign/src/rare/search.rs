@@ -6,13 +6,13 @@
 //! ```
 //!
 //! An evolution strategy (H.-G. Beyer and H.-P. Schwefel, *Evolution strategies: a comprehensive
-//! introduction*, Natural Computing 1 (2002) 3–52) of the kind (μ + λ): the nearest μ runs stay, and
-//! λ new ones are moved from them, as in subset simulation. Each move has a width of its own, drawn at
-//! random, because a search does not know how narrow its region is. Some runs are
-//! drawn from the scenario itself, and a search that comes no nearer starts again.
+//! introduction*, Natural Computing 1 (2002) 3–52) of the kind (μ + λ): the nearest μ runs stay,
+//! and λ new ones are moved from them, as in subset simulation. Each move has a width of its own,
+//! drawn at random, because a search does not know how narrow its region is. Some runs are drawn
+//! from the scenario itself, and a search that comes no nearer starts again.
 //!
-//! The runs depend on the seed and on the responses only, and not on the number of threads: a search
-//! always ends after a complete round.
+//! The runs depend on the seed and on the responses only, and not on the number of threads: a
+//! search always ends after a complete round.
 
 use closecall_traffic::Stream;
 use closecall_traffic::maths::{exp, ln};
@@ -27,8 +27,8 @@ const FIRST: u64 = 200;
 /// 5 to 50 and 20 to 200 are plausible.
 const NEAREST: usize = 20;
 const ROUND: u64 = 50;
-/// Share of the runs of a round that are drawn from the scenario (-): an assumption; 0.05 to 0.3 are
-/// plausible.
+/// Share of the runs of a round that are drawn from the scenario (-): an assumption; 0.05 to 0.3
+/// are plausible.
 const FRESH: f64 = 0.1;
 /// Smallest and largest width of a move (standard deviations): assumptions; a width of 1 is a new
 /// draw.

@@ -53,8 +53,8 @@ pub(super) struct Expected<'a> {
 }
 
 impl Expected<'_> {
-    /// Returns the results of a block in the order of its samples or points. Returns the fault if a sample is
-    /// missing, or if one is of another campaign.
+    /// Returns the results of a block in the order of its samples or points. Returns the fault if a
+    /// sample is missing, or if one is of another campaign.
     pub(super) fn decode(&self, bytes: &[u8]) -> Result<Vec<Finished>, String> {
         let mut lines = bytes.split_inclusive(|byte| *byte == b'\n');
         let header: Header = serde_json::from_slice(lines.next().unwrap_or_default())

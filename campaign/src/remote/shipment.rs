@@ -46,7 +46,8 @@ impl Shipment {
         let programs = manifest.programs();
         let of_programs = programs.iter().flat_map(|program| program_files(program, None));
         for (name, path) in manifest.arms.iter().flat_map(named).chain(of_programs) {
-            // A program that was found by the search path, or has an absolute path, is a matter of each machine.
+            // A program that was found by the search path, or has an absolute path, is a matter of
+            // each machine.
             if is_within(&name) && Path::new(&name) == path && files.iter().all(|file| file.name != name) {
                 let fail = |source| RemoteError::File { path: path.clone(), source };
                 let is_executable = is_executable(&fs::metadata(&path).map_err(fail)?);

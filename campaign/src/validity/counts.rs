@@ -37,7 +37,8 @@ impl Invariance {
         }
     }
 
-    /// Returns true if a controller that answers the same inputs in different ways breaks the check.
+    /// Returns true if a controller that answers the same inputs in different ways breaks the
+    /// check.
     pub const fn is_of_repeatability(self) -> bool {
         matches!(self, Self::Repetition | Self::Threads)
     }

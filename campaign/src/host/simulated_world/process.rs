@@ -33,7 +33,8 @@ pub(super) struct State {
     pub(super) rate: f64,
     /// Number of faults so far.
     pub(super) faults: u64,
-    /// Number of crashes so far in the run that the present question asks for: one sample in one arm.
+    /// Number of crashes so far in the run that the present question asks for: one sample in one
+    /// arm.
     pub(super) crashes: u32,
 }
 
@@ -107,8 +108,8 @@ enum Fault {
     Late,
     /// The process reports that a call hangs, and ends.
     HangingCall,
-    /// The process reports that a call hangs in a validity check, and ends. The sample already has its
-    /// outcome.
+    /// The process reports that a call hangs in a validity check, and ends. The sample already has
+    /// its outcome.
     HangingCheck,
 }
 
@@ -247,8 +248,8 @@ impl Process {
 }
 
 impl Peer for Process {
-    /// Treats a line that arrived before the question as a line without a question, as for a process of
-    /// the operating system.
+    /// Treats a line that arrived before the question as a line without a question, as for a
+    /// process of the operating system.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         let shared = Arc::clone(&self.state);
         let mut state = lock(&shared);
