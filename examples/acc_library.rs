@@ -1,12 +1,13 @@
-//! The built-in controller `acc` (cruise control and emergency braking) as a shared library in Rust, to the last bit.
+//! The built-in controller `acc` (cruise control and emergency braking) as a shared library in
+//! Rust, to the last bit.
 //!
 //! ```sh
 //! cargo build --release --example acc_library
 //! closecall run low-thw-overtake --controller lib:target/release/examples/libacc_library.so
 //! ```
 //!
-//! A library of your own is a crate with `crate-type = ["cdylib"]` that needs nothing of Closecall: the types below come from
-//! `controllers/include/closecall_controller.h`, which documents them.
+//! A library of your own is a crate with `crate-type = ["cdylib"]` that needs nothing of Closecall:
+//! the types below come from `controllers/include/closecall_controller.h`, which documents them.
 
 #![expect(unsafe_code, reason = "the interface passes pointers")]
 
@@ -100,8 +101,8 @@ struct Front {
     acceleration_mps2: f64,
 }
 
-/// Returns the constant deceleration (m/s²) that keeps a distance of `left_m` to the vehicle ahead, if that vehicle keeps its
-/// deceleration.
+/// Returns the constant deceleration (m/s²) that keeps a distance of `left_m` to the vehicle ahead,
+/// if that vehicle keeps its deceleration.
 fn required(v: f64, front: Front, left_m: f64) -> f64 {
     let (room, lead, braking) = ((front.gap_m - left_m).max(0.1), front.speed_mps, -front.acceleration_mps2);
     let removing = if v > lead { (v - lead) * (v - lead) / (2.0 * room) } else { 0.0 };
@@ -118,7 +119,8 @@ fn required(v: f64, front: Front, left_m: f64) -> f64 {
     }
 }
 
-/// Returns a limit that has the value `slow` up to 5 m/s, the value `fast` from 20 m/s on, and is linear in between.
+/// Returns a limit that has the value `slow` up to 5 m/s, the value `fast` from 20 m/s on, and is
+/// linear in between.
 fn limited(slow: f64, fast: f64, v: f64) -> f64 {
     slow + ((v - 5.0) / 15.0).clamp(0.0, 1.0) * (fast - slow)
 }

@@ -1,13 +1,13 @@
-//! A custom controller in one file: the controller, the factory that creates one for each sample, and a campaign that
-//! compares it with the built-in cruise control.
+//! A custom controller in one file: the controller, the factory that creates one for each sample,
+//! and a campaign that compares it with the built-in cruise control.
 //!
 //! ```text
 //! cargo run --release --example own_controller [SCENARIO.toml] [SAMPLES]
 //! ```
 //!
-//! `RoomMaker` uses the built-in cruise control and emergency braking, but decelerates by at least 0.5 m/s² while a vehicle
-//! is close behind, like a driver that feels pressed. It does not predict when the rear vehicle arrives, and is therefore
-//! no substitute for the margin increase system.
+//! `RoomMaker` uses the built-in cruise control and emergency braking, but decelerates by at least
+//! 0.5 m/s² while a vehicle is close behind, like a driver that feels pressed. It does not predict
+//! when the rear vehicle arrives, and is therefore no substitute for the margin increase system.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -52,7 +52,8 @@ impl RoomMaker {
 
 impl EgoController for RoomMaker {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
-        // The built-in stack rejects input that is not finite. A controller without it should call `input.check_finite()`.
+        // The built-in stack rejects input that is not finite. A controller without it should call
+        // `input.check_finite()`.
         let cruise = self.cruise.step(input)?;
         if !Self::is_pressed(input) || cruise.state == EgoState::EmergencyBraking {
             return Ok(cruise);
