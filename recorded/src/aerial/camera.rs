@@ -29,8 +29,8 @@ pub const WIDTH_PX: usize = 1_280;
 pub const HEIGHT_PX: usize = 192;
 /// Columns and rows of the pictures from which the published method derives trajectories.
 pub const PUBLISHED_PX: [usize; 2] = [4_104, 3_006];
-/// Factor by which [`PUBLISHED_PX`] are reduced before the detector searches them. From 100 m, a pixel
-/// then covers 0.11 m of ground at the nadir: the detector knows vehicles of this size.
+/// Factor by which [`PUBLISHED_PX`] are reduced before the detector searches them. From 100 m, a
+/// pixel then covers 0.11 m of ground at the nadir: the detector knows vehicles of this size.
 pub const PUBLISHED_REDUCTION: usize = 3;
 /// Usual altitude (m).
 pub const ALTITUDE_M: f64 = 100.0;

@@ -39,10 +39,10 @@ const MOST_LANES: u8 = 8;
 /// Margin by which a vehicle has to be within the picture, so that it counts as watched (px).
 const MARGIN_PX: f64 = 40.0;
 
-/// Standard deviations of the width of a detected box on the ground (m), of cars and of trucks. They
-/// are measured on 160 pictures of the training set at 11 to 34° from the nadir, against the exact
-/// boxes (1.48 median absolute deviations of 426 cars and 241 trucks: 0.14 to 0.19 m and 0.28 to
-/// 0.32 m).
+/// Standard deviations of the width of a detected box on the ground (m), of cars and of trucks.
+/// They are measured on 160 pictures of the training set at 11 to 34° from the nadir, against the
+/// exact boxes (1.48 median absolute deviations of 426 cars and 241 trucks: 0.14 to 0.19 m and 0.28
+/// to 0.32 m).
 const DETECTED_WIDTH_SIGMA_M: [f64; 2] = [0.17, 0.30];
 
 /// The boxes from which tracks are derived.

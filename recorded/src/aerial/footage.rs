@@ -1,9 +1,9 @@
 //! Rate and size of the pictures of a flight.
 //!
 //! The pictures of the published method are reduced before the detector searches them, because it
-//! knows vehicles of 0.11 to 0.17 m per pixel: each pixel that it sees is the mean of 3 × 3 recorded
-//! ones. Rows at the edges that make no whole pixel, or no whole cell of the detector, are left out,
-//! as many above as below.
+//! knows vehicles of 0.11 to 0.17 m per pixel: each pixel that it sees is the mean of 3 × 3
+//! recorded ones. Rows at the edges that make no whole pixel, or no whole cell of the detector, are
+//! left out, as many above as below.
 
 use closecall_sensors::camera::{CHANNELS, Image};
 use closecall_traffic::Time;
@@ -78,8 +78,8 @@ const fn searched(side_px: usize) -> usize {
     side_px / PUBLISHED_REDUCTION / STRIDE * STRIDE
 }
 
-/// Reduces the middle of an image to this size. Each pixel is the mean of a square of `factor` pixels
-/// on a side. The image is at least as large as all squares.
+/// Reduces the middle of an image to this size. Each pixel is the mean of a square of `factor`
+/// pixels on a side. The image is at least as large as all squares.
 fn reduced(image: &Image, factor: usize, [width, height]: [usize; 2]) -> Image {
     let columns = image.width as usize;
     let (left, top) = ((columns - width * factor) / 2, (image.height as usize - height * factor) / 2);
@@ -115,8 +115,8 @@ mod tests {
 
     #[test]
     fn a_reduced_image_has_the_means_of_squares_in_its_middle() {
-        // 5 x 4 pixels, each with its number in all channels: two squares of 2 x 2 pixels in the middle
-        // rows, beginning at column 0.
+        // 5 x 4 pixels, each with its number in all channels: two squares of 2 x 2 pixels in the
+        // middle rows, beginning at column 0.
         let rgb = (0..20_u8).flat_map(|number| [number, number, 100 + number]).collect();
         let small = reduced(&Image { width: 5, height: 4, rgb }, 2, [2, 1]);
         assert_eq!((small.width, small.height), (2, 1));

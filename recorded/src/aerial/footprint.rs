@@ -12,16 +12,17 @@
 //! [`corrected`] inverts this for a known height. F. Kruber et al. (IV 2020) correct the same
 //! displacement by the height of their test vehicle.
 //!
-//! The height of other vehicles is not known. [`silhouette`] estimates the height of each vehicle from
-//! its box: the box is wider by about δ than the vehicle, and the widths of a class differ less than
-//! its heights. With the expected width w₀ ± σ_w and height h₀ ± σ_h, the estimate has the smallest
+//! The height of other vehicles is not known. [`silhouette`] estimates the height of each vehicle
+//! from its box: the box is wider by about δ than the vehicle, and the widths of a class differ
+//! less than its heights. With the expected width w₀ ± σ_w and height h₀ ± σ_h, the estimate has
+//! the smallest
 //!
 //! ```text
 //!   ((w(h) − w₀) / σ_w)² + ((h − h₀) / σ_h)²        w(h): width of the footprint that a height of h leaves
 //! ```
 //!
-//! That is the most probable height if both are normal. σ_w holds the error of the box, too: where the
-//! box says little about the width, or the view is steep, the expected height remains.
+//! That is the most probable height if both are normal. σ_w holds the error of the box, too: where
+//! the box says little about the width, or the view is steep, the expected height remains.
 
 use std::ops::RangeInclusive;
 
@@ -63,9 +64,9 @@ impl ExpectedSize {
     /// - Cars: new cars of 2023 in the EU are 1.80 m wide on average, 1.78 m in 2018 (Transport &
     ///   Environment, 2024). The spread, and heights from low coupés to panel vans, are assumptions
     ///   with plausible ranges of 0.08 to 0.12 m and 0.2 to 0.35 m.
-    /// - Trucks and coaches: at most 2.55 m wide and 4.00 m high (Directive 96/53/EC, annex I). Rigid
-    ///   trucks are lower. Mean and spread are assumptions with plausible ranges of 2.45 to 2.55 ± 0.05
-    ///   to 0.1 m, and 3.4 to 3.8 ± 0.3 to 0.5 m.
+    /// - Trucks and coaches: at most 2.55 m wide and 4.00 m high (Directive 96/53/EC, annex I).
+    ///   Rigid trucks are lower. Mean and spread are assumptions with plausible ranges of 2.45 to
+    ///   2.55 ± 0.05 to 0.1 m, and 3.4 to 3.8 ± 0.3 to 0.5 m.
     pub fn of(class: VehicleClass) -> Self {
         let (width_m, width_sigma_m, height_m, height_sigma_m, heights_m) = match class {
             VehicleClass::Car => (1.80, 0.10, 1.5, 0.25, 1.2..=2.8),
@@ -137,8 +138,8 @@ pub fn corrected(camera: &AerialCamera, seen_m: &OrientedBox, height_m: f64) -> 
     estimate
 }
 
-/// Returns the footprint whose visible body covers the box `seen_m`, and the height of the vehicle (m),
-/// which is estimated from the width of the box.
+/// Returns the footprint whose visible body covers the box `seen_m`, and the height of the vehicle
+/// (m), which is estimated from the width of the box.
 pub fn silhouette(camera: &AerialCamera, seen_m: &OrientedBox, expected: &ExpectedSize) -> (OrientedBox, f64) {
     let width_m = |height_m: f64| corrected(camera, seen_m, height_m).width_m;
     let [width_weight, height_weight] =

@@ -36,8 +36,8 @@ pub struct CriterionLoss {
     pub crossing_s: Option<f64>,
 }
 
-/// One metric, over the lane changes for which both truth and tracks have a value. Times to collision
-/// count only below 10 s.
+/// One metric, over the lane changes for which both truth and tracks have a value. Times to
+/// collision count only below 10 s.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MetricLoss {
     /// Name of the metric, which ends with its unit.
@@ -48,7 +48,8 @@ pub struct MetricLoss {
     pub bias: Option<f64>,
     /// Median of the magnitude of the difference.
     pub error: Option<f64>,
-    /// Number of lane changes that are critical either in the truth or in the tracks, but not in both.
+    /// Number of lane changes that are critical either in the truth or in the tracks, but not in
+    /// both.
     pub flipped: usize,
 }
 

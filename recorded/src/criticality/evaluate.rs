@@ -34,8 +34,8 @@ pub struct Judgement {
     /// True if a short TTCE is critical by itself. Otherwise TTCE only decides whether DCE is
     /// evaluated.
     pub ttce_alone: bool,
-    /// True if the encounters along the lanes are computed, too ([`CurvilinearMetrics`]). They change
-    /// no other value.
+    /// True if the encounters along the lanes are computed, too ([`CurvilinearMetrics`]). They
+    /// change no other value.
     pub curvilinear: bool,
 }
 
@@ -55,10 +55,10 @@ pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<
     evaluated.collect()
 }
 
-/// Returns the instant of the common clock that is nearest to the crossing. Of two equally near ones,
-/// this is the later one: at the crossing, the vehicle is in its new lane. Returns the crossing itself
-/// if the track has no instant within half a period of it, and `None` if `data` does not have the
-/// track.
+/// Returns the instant of the common clock that is nearest to the crossing. Of two equally near
+/// ones, this is the later one: at the crossing, the vehicle is in its new lane. Returns the
+/// crossing itself if the track has no instant within half a period of it, and `None` if `data`
+/// does not have the track.
 fn instant_of_crossing(data: &SmoothedTrajectoryData, lane_change: &LaneChange) -> Option<Time> {
     let track = &data.tracks[data.track_index(lane_change.track_id)?].trajectory;
     let crossing = Time::from_s(lane_change.crossing_s);
@@ -127,8 +127,8 @@ impl<'a> VehicleState<'a> {
         Self { track, point, moving: Moving { shape, vx_mps, vy_mps } }
     }
 
-    /// Returns the movement of a vehicle that completes its lane change, if one is running, and else
-    /// keeps its lateral position.
+    /// Returns the movement of a vehicle that completes its lane change, if one is running, and
+    /// else keeps its lateral position.
     fn settling(&self, running: &RunningChanges) -> Settling {
         let to_go_m = running.end_m(self.track.track_id, self.point.time).map(|end_m| end_m - self.point.d_m);
         let lateral_mps = self.moving.vy_mps;
@@ -408,8 +408,8 @@ mod tests {
 
     #[test]
     fn a_vehicle_on_another_carriageway_is_no_opponent() {
-        // As fast as the vehicle in the target lane of the test before, behind a strip of 32 m without
-        // vehicles, and behind one of 6 m.
+        // As fast as the vehicle in the target lane of the test before, behind a strip of 32 m
+        // without vehicles, and behind one of 6 m.
         let beyond = |d_m: f64| evaluated(vec![straight_track(2, -70.0, 38.0, d_m, 110)]).metrics;
         assert_eq!(absent(beyond(-40.0).ttce_s), Some(Absent::NoOpponent));
         assert_eq!(absent(beyond(-40.0).distance_m), Some(Absent::NoOpponent));
@@ -447,8 +447,8 @@ mod tests {
         }
     }
 
-    /// The metrics by both motion models of a lane change from lane 3 to lane 2 between 3 and 8 s at
-    /// 30 m/s, against one other vehicle.
+    /// The metrics by both motion models of a lane change from lane 3 to lane 2 between 3 and 8 s
+    /// at 30 m/s, against one other vehicle.
     fn both_models(other: Trajectory) -> (Metrics, CurvilinearMetrics) {
         let tracks = vec![changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 5.0), 110), other];
         let judgement = Judgement { curvilinear: true, ..Judgement::default() };
@@ -462,8 +462,8 @@ mod tests {
         // 1.3 m/s carries the vehicle that changes lanes by 3.3 m until it has passed, 2.5 s later.
         let (straight, along) = both_models(straight_track(2, 75.5, 20.0, -1.75, 110));
         assert!(straight.dce_m.is_critical(), "{straight:?}");
-        // Both are 1.8 m wide, and 3.5 m apart in their lanes: 1.7 m. Until it is in its new lane, the
-        // box is turned to the left by up to 1.6 degrees: its corner reaches 0.06 m further.
+        // Both are 1.8 m wide, and 3.5 m apart in their lanes: 1.7 m. Until it is in its new lane,
+        // the box is turned to the left by up to 1.6 degrees: its corner reaches 0.06 m further.
         let along_m = along.dce_curvilinear_m.value().unwrap();
         assert!((1.6..1.75).contains(&along_m) && !along.dce_curvilinear_m.is_critical(), "{along_m}");
     }

@@ -13,8 +13,9 @@
 //!
 //! In addition, two metrics without a threshold: the time to collision `ttc_s` (TTC) and the
 //! deceleration rate to avoid a crash `drac_mps2` (DRAC), both towards the vehicles ahead that
-//! count for THW, at constant speeds of both vehicles. All metrics are also evaluated at one instant
-//! alone: the instant of the common clock nearest to the crossing, the later one of two equally near.
+//! count for THW, at constant speeds of both vehicles. All metrics are also evaluated at one
+//! instant alone: the instant of the common clock nearest to the crossing, the later one of two
+//! equally near.
 //!
 //! # Definitions
 //!
@@ -34,14 +35,14 @@
 //!   [`Judgement::ttce_alone`] asks for it: vehicles that pass each other at a safe distance have
 //!   one, too.
 //! - **Encounters along the lanes**, only if [`Judgement::curvilinear`] asks for them: a constant
-//!   velocity carries a vehicle that changes lanes beyond its new lane. With this model, both vehicles
-//!   keep their speeds along the road. A vehicle whose lane change is running keeps its lateral speed
-//!   until it is at the lateral position at which its lane change ends in the recording, and stays
-//!   there. All others keep their lateral positions. Boxes that do not move across the road point
-//!   along it. Results, horizon and condition are as for TTCE and DCE. The end of the lane change is
-//!   known only in hindsight, as its window and its new lane are. The published thresholds come
-//!   without a motion model. They judge the encounters at constant velocity, which need no further
-//!   assumption, so shares and figures refer to these.
+//!   velocity carries a vehicle that changes lanes beyond its new lane. With this model, both
+//!   vehicles keep their speeds along the road. A vehicle whose lane change is running keeps its
+//!   lateral speed until it is at the lateral position at which its lane change ends in the
+//!   recording, and stays there. All others keep their lateral positions. Boxes that do not move
+//!   across the road point along it. Results, horizon and condition are as for TTCE and DCE. The
+//!   end of the lane change is known only in hindsight, as its window and its new lane are. The
+//!   published thresholds come without a motion model. They judge the encounters at constant
+//!   velocity, which need no further assumption, so shares and figures refer to these.
 //! - **Shares** refer to the complete lane changes, unless [`Counted::All`] asks for all.
 //! - **Magnitudes**: published acceleration thresholds are signed, −8 m/s² for braking; here the
 //!   magnitude counts.

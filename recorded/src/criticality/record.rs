@@ -100,9 +100,9 @@ impl FollowingMetrics {
 }
 
 /// The closest encounters of vehicles that stay in their lanes, or complete their lane changes
-/// ([`curvilinear_encounter`](closecall_traffic::metrics::curvilinear_encounter)). `critical` states
-/// how the thresholds of DCE and TTCE would judge them. The counts of critical metrics leave them
-/// out.
+/// ([`curvilinear_encounter`](closecall_traffic::metrics::curvilinear_encounter)). `critical`
+/// states how the thresholds of DCE and TTCE would judge them. The counts of critical metrics leave
+/// them out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvilinearMetrics {
     /// Smallest distance at closest encounter along the lanes (m).

@@ -39,8 +39,8 @@ impl RunningChanges {
         Self { by_track }
     }
 
-    /// Returns the lateral position at which the lane change of a track ends that runs at `time` (m);
-    /// of several the one that ends last. `None` if none is running.
+    /// Returns the lateral position at which the lane change of a track ends that runs at `time`
+    /// (m); of several the one that ends last. `None` if none is running.
     pub(super) fn end_m(&self, track_id: u64, time: Time) -> Option<f64> {
         let changes = self.by_track.get(&track_id)?;
         let running = changes.iter().filter(|change| change.span[0] <= time && time <= change.span[1]);

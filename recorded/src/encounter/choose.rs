@@ -36,8 +36,8 @@ pub enum ChoiceError {
 pub struct Wanted {
     /// Track that changes lanes; `None` for the most critical lane change.
     pub track: Option<u64>,
-    /// Number of the lane change among the track's lane changes, in order of time, from 1 on; `None` for
-    /// the most critical one.
+    /// Number of the lane change among the track's lane changes, in order of time, from 1 on;
+    /// `None` for the most critical one.
     pub number: Option<usize>,
     /// Whether a lead vehicle is required.
     pub lead: Lead,
@@ -54,8 +54,8 @@ pub fn choose(data: &SmoothedTrajectoryData, wanted: Wanted, period: Time) -> Re
 }
 
 /// Returns what `accept` makes of the most critical lane change of `data` that is wanted, is an
-/// encounter and is accepted, with a trajectory point at every `period`. If none is accepted, returns
-/// the first reason of `accept`.
+/// encounter and is accepted, with a trajectory point at every `period`. If none is accepted,
+/// returns the first reason of `accept`.
 ///
 /// # Errors
 /// [`ChoiceError`] if there is no encounter.

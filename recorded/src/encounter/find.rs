@@ -18,10 +18,10 @@ use crate::lane_change::LaneChange;
 /// `period`.
 ///
 /// # Errors
-/// Returns [`NoEncounter`] if the rear vehicle and the vehicles ahead of it are not recorded for long
-/// enough before the crossing, or if they do not share a valid road. If a lead vehicle is required,
-/// also if there is no ego or no lead vehicle, and if the rear vehicle is not close behind the ego
-/// vehicle at the crossing.
+/// Returns [`NoEncounter`] if the rear vehicle and the vehicles ahead of it are not recorded for
+/// long enough before the crossing, or if they do not share a valid road. If a lead vehicle is
+/// required, also if there is no ego or no lead vehicle, and if the rear vehicle is not close
+/// behind the ego vehicle at the crossing.
 pub fn encounter(
     data: &SmoothedTrajectoryData,
     change: &LaneChange,
@@ -130,8 +130,8 @@ impl<'a> Roles<'a> {
     }
 
     /// Returns the first instant at which the rear vehicle is recorded, together with the vehicle
-    /// that it overtakes and, if enough time is left, with the vehicle that is ahead of it in its new
-    /// lane.
+    /// that it overtakes and, if enough time is left, with the vehicle that is ahead of it in its
+    /// new lane.
     fn start_of_record(&self, data: &SmoothedTrajectoryData, change: &LaneChange) -> Result<Time, NoEncounter> {
         let crossing = Time::from_s(change.crossing_s);
         let since = |track: &Trajectory| track.span().map_or(self.change_start, |(first, _)| first);

@@ -24,12 +24,13 @@ pub const EGO_INDEX: usize = 0;
 pub const LEAD_INDEX: usize = 1;
 /// Index of the rear vehicle in [`RecordedEncounter::vehicles`], if there is a lead vehicle.
 pub const REAR_INDEX: usize = 2;
-/// Indices of the rear vehicle and of the vehicle that it overtakes, if no lead vehicle is required.
+/// Indices of the rear vehicle and of the vehicle that it overtakes, if no lead vehicle is
+/// required.
 const REAR_ALONE_INDEX: usize = 0;
 const OVERTAKEN_INDEX: usize = 1;
 
-/// Whether an encounter has a lead vehicle, whose distance to the ego vehicle is the margin that can
-/// be increased.
+/// Whether an encounter has a lead vehicle, whose distance to the ego vehicle is the margin that
+/// can be increased.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lead {
     /// A lane change without a lead vehicle is no encounter.
@@ -75,15 +76,15 @@ pub struct RecordedEncounter {
     pub lead: Lead,
     /// Whether one of the vehicles is the ego vehicle: always with a lead vehicle.
     pub has_ego: bool,
-    /// The vehicles with roles, then all other vehicles that come near, in order of their track ids.
-    /// The roles are the ego, the lead and the rear vehicle; without a lead vehicle, the rear vehicle
-    /// and, if there is one, the ego vehicle.
+    /// The vehicles with roles, then all other vehicles that come near, in order of their track
+    /// ids. The roles are the ego, the lead and the rear vehicle; without a lead vehicle, the rear
+    /// vehicle and, if there is one, the ego vehicle.
     pub vehicles: Vec<Participant>,
 }
 
 impl RecordedEncounter {
-    /// Returns the trajectories of the ego, the lead and the rear vehicle of an encounter with a lead
-    /// vehicle, in this order.
+    /// Returns the trajectories of the ego, the lead and the rear vehicle of an encounter with a
+    /// lead vehicle, in this order.
     pub fn ego_lead_rear(&self) -> [&Trajectory; 3] {
         [EGO_INDEX, LEAD_INDEX, REAR_INDEX].map(|index| &self.vehicles[index].trajectory)
     }

@@ -22,7 +22,8 @@ pub struct SmoothedFile {
     pub flaws: FlawCounts,
     /// Time between two recorded frames.
     pub period: Time,
-    /// Whether a warning says that lane changes may be missing, or that the recorded lanes are none.
+    /// Whether a warning says that lane changes may be missing, or that the recorded lanes are
+    /// none.
     pub is_in_doubt: bool,
     /// Whether a warning says that the recorded lanes are none.
     pub doubts_lanes: bool,
@@ -34,8 +35,8 @@ pub struct SmoothedFile {
 
 /// Smooths the tracks of the file at `path`, and holds no more of its rows than needed.
 ///
-/// A file of more than [`STREAM_ROWS`](crate::trajectory_data::STREAM_ROWS) rows is held as a whole only if it is not sorted, or if it may
-/// hold several data sets whose clocks overlap.
+/// A file of more than [`STREAM_ROWS`](crate::trajectory_data::STREAM_ROWS) rows is held as a whole
+/// only if it is not sorted, or if it may hold several data sets whose clocks overlap.
 ///
 /// # Errors
 /// [`TrajectoryFileError`] with file, line, column and allowed values.

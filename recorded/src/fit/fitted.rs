@@ -34,8 +34,8 @@ pub fn correlated(data_sets: &[TrajectoryData], seed: u64) -> FittedDistribution
     fit_samples(&samples, data_sets.iter().map(|data| (data.name.clone(), data.hash.clone())).collect(), seed)
 }
 
-/// Fits the distributions, and the rank correlations between the quantities, like [`correlated`], to files
-/// whose tracks are smoothed already.
+/// Fits the distributions, and the rank correlations between the quantities, like [`correlated`],
+/// to files whose tracks are smoothed already.
 pub fn correlated_in_files(files: &[SmoothedFile], seed: u64) -> FittedDistributions {
     let mut samples = Samples::default();
     for file in files {

@@ -68,8 +68,8 @@ impl DetectionBasis {
         by_lane && self.recorded_crossings + self.hidden_crossings == 0
     }
 
-    /// Returns why vehicles change their recorded lanes although no lane change was found, of `found`
-    /// lane changes.
+    /// Returns why vehicles change their recorded lanes although no lane change was found, of
+    /// `found` lane changes.
     pub fn unexplained_crossings(&self, lane_changes: usize) -> Option<String> {
         let by_lane = (self.criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
         (by_lane && lane_changes == 0 && self.recorded_crossings > 0).then(|| {

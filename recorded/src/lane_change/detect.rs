@@ -159,8 +159,8 @@ fn by_crossings(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -
     matched.map(change).collect()
 }
 
-/// Returns the lane changes over estimated markings, apart from the crossings of a vehicle that sways about
-/// a marking.
+/// Returns the lane changes over estimated markings, apart from the crossings of a vehicle that
+/// sways about a marking.
 fn by_estimated_lanes(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -> Vec<LaneChange> {
     let mut changes = by_crossings(track, crossings, lane_width_m);
     changes.retain(|change| change.lateral_shift_m >= MIN_ESTIMATED_SHIFT_M);

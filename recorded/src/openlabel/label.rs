@@ -57,8 +57,8 @@ impl From<TrajectoryFileError> for Failure {
     }
 }
 
-/// Writes the tracks of the file at `input`, which is read with `options`, and `labels` as OpenLABEL
-/// 1.0.0 to `output`.
+/// Writes the tracks of the file at `input`, which is read with `options`, and `labels` as
+/// OpenLABEL 1.0.0 to `output`.
 ///
 /// The file appears complete or not at all. A file of more than
 /// [`WINDOW_ROWS`](crate::trajectory_data::WINDOW_ROWS) rows that is not sorted is held in memory.

@@ -1,7 +1,7 @@
 //! The messages of ASAM Open Simulation Interface (OSI) 3.8 that Closecall reads and writes.
 //!
-//! `osi3.proto` lists their fields. Names and numbers are the published ones, and the meaning of each
-//! is in the standard.
+//! `osi3.proto` lists their fields. Names and numbers are the published ones, and the meaning of
+//! each is in the standard.
 
 #[expect(missing_docs, reason = "the standard documents the fields")]
 mod messages;

@@ -15,8 +15,8 @@ pub const FAILING_SHARE: f64 = 0.05;
 /// [`FAILING_SHARE`].
 pub const FEWEST_LANE_CHANGES: usize = 20;
 
-/// A track, and the distances to the markings at each of its points. The distances are empty if they
-/// were not measured.
+/// A track, and the distances to the markings at each of its points. The distances are empty if
+/// they were not measured.
 pub type Measured = (Trajectory, Vec<MarkingDistances>);
 
 /// The levels of the disturbances, and the repetitions and seed of the noise.
@@ -299,7 +299,8 @@ mod tests {
 
     #[test]
     fn undisturbed_detections_are_no_failure_and_repetitions_are_kept() {
-        // The vehicle moves by one lane, but its recorded lane never changes: the reference is empty.
+        // The vehicle moves by one lane, but its recorded lane never changes: the reference is
+        // empty.
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         track.points.iter_mut().for_each(|point| point.lane = closecall_traffic::Lane(2));
         let study = Study::new(vec![(track, Vec::new())], &LaneMarkings::default());

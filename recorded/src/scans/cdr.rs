@@ -1,5 +1,5 @@
-//! Reads messages of ROS 2 in CDR, the encoding of DDS (OMG *Common Data Representation*, version 1).
-//! The messages are `sensor_msgs/msg/PointCloud2` and `nav_msgs/msg/Odometry`.
+//! Reads messages of ROS 2 in CDR, the encoding of DDS (OMG *Common Data Representation*, version
+//! 1). The messages are `sensor_msgs/msg/PointCloud2` and `nav_msgs/msg/Odometry`.
 
 use closecall_traffic::{Time, maths};
 

@@ -3,8 +3,8 @@
 //! The format is from liblzf by Marc Lehmann. A control byte `c` below 32 introduces `c` + 1 bytes
 //! that are taken as they are. Any other control byte introduces a copy of earlier output:
 //!
-//! - The upper three bits of the control byte are the length of the copy minus 2. If they are 7, the
-//!   next byte is added to the length.
+//! - The upper three bits of the control byte are the length of the copy minus 2. If they are 7,
+//!   the next byte is added to the length.
 //! - The lower five bits and the following byte are the distance back to the copied bytes minus 1.
 
 /// Control bytes below this one introduce bytes as they are.

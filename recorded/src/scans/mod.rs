@@ -8,8 +8,8 @@
 //!  labels.csv ─▶ labels ─▶ errors of its tracks
 //! ```
 //!
-//! `docs/reference/output.md` has the layouts. A run writes them, too, with all that the chain needs
-//! to give the same bits again.
+//! `docs/reference/output.md` has the layouts. A run writes them, too, with all that the chain
+//! needs to give the same bits again.
 
 mod bag;
 mod cdr;
@@ -100,7 +100,8 @@ impl Recording {
     /// Returns the next scan of a LiDAR that looks back; `None` behind the last.
     ///
     /// # Errors
-    /// [`ScanFileError`] if it cannot be read, or does not end after the previous scan of its LiDAR.
+    /// [`ScanFileError`] if it cannot be read, or does not end after the previous scan of its
+    /// LiDAR.
     pub fn next_scan(&mut self) -> Result<Option<TakenScan>, ScanFileError> {
         let scan = match &mut self.source {
             Source::Folder(folder) => folder.next_scan(&self.options)?,

@@ -54,8 +54,8 @@ impl ScanOptions {
         }
     }
 
-    /// Returns the points with reflectivities, without those that have no return, and with the end of
-    /// their scan if its stamp is the start.
+    /// Returns the points with reflectivities, without those that have no return, and with the end
+    /// of their scan if its stamp is the start.
     pub(super) fn prepared(&self, mut points: RecordedPoints) -> Result<RecordedPoints, ScanFileProblem> {
         points.intensity.iter_mut().flatten().for_each(|value| *value *= self.intensity_scale);
         if self.drops_invalid {

@@ -189,7 +189,8 @@ impl Header {
                     ));
                 }
             };
-            // Each of the values of a field has a column of its own in the data; only the first has a name.
+            // Each of the values of a field has a column of its own in the data; only the first has
+            // a name.
             for value in 0..counts[index].min(MAX_POINTS) {
                 let name = if value == 0 { name.clone() } else { String::new() };
                 fields.push(Field { name, number, offset });
