@@ -26,12 +26,13 @@ fn parameters(calibration: &Calibration) -> impl Iterator<Item = (&'static Param
     specs.zip(&calibration.pooled).map(|((index, spec), pooled)| (spec, *pooled, quantiles_of(calibration, index)))
 }
 
-/// Distance from an end of the searched range from which on a value lies in it, as a share of the range
-/// (-): numerical.
+/// Distance from an end of the searched range from which on a value lies in it, as a share of the
+/// range (-): numerical.
 const AT_LIMIT: f64 = 1e-3;
 
-/// Returns the ends of the searched range of a parameter at which the pooled value or values of single
-/// pairs lie, in words; nothing if there are none. The best value may lie beyond such an end.
+/// Returns the ends of the searched range of a parameter at which the pooled value or values of
+/// single pairs lie, in words; nothing if there are none. The best value may lie beyond such an
+/// end.
 fn at_limits(calibration: &Calibration, index: usize) -> Option<String> {
     let spec = calibration.model.parameters().get(index)?;
     let near = AT_LIMIT * (spec.max - spec.min);

@@ -8,9 +8,9 @@ pub(crate) fn escaped(text: &str) -> String {
 }
 
 /// Returns text in one line, in which nothing starts HTML, an entity, an emphasis, a formula, an
-/// image, a link, a mention or the number of an issue, and nothing at its begin a heading or a list:
-/// a controller's message may hold all of them. Only text between backticks stays, since nothing is
-/// marked in it. It is for the Markdown of GitHub and GitLab.
+/// image, a link, a mention or the number of an issue, and nothing at its begin a heading or a
+/// list: a controller's message may hold all of them. Only text between backticks stays, since
+/// nothing is marked in it. It is for the Markdown of GitHub and GitLab.
 pub(crate) fn in_markdown(text: &str) -> String {
     let text: Vec<char> = text.chars().map(|c| if matches!(c, '\n' | '\r') { ' ' } else { c }).collect();
     let mut escaped = String::with_capacity(text.len());
@@ -27,8 +27,8 @@ pub(crate) fn in_markdown(text: &str) -> String {
     escaped
 }
 
-/// Escapes what would start a heading, a quotation or a list at the beginning of a text. Returns the
-/// index of the first character that is left.
+/// Escapes what would start a heading, a quotation or a list at the beginning of a text. Returns
+/// the index of the first character that is left.
 fn block_start(text: &[char], escaped: &mut String) -> usize {
     let blanks = text.iter().take_while(|c| c.is_whitespace()).count();
     let digits = text[blanks..].iter().take_while(|c| c.is_ascii_digit()).count();
@@ -46,8 +46,8 @@ fn block_start(text: &[char], escaped: &mut String) -> usize {
     blanks + digits + 1
 }
 
-/// Copies a code span that starts at `start`, or escapes backticks that start none. Returns the index
-/// after them.
+/// Copies a code span that starts at `start`, or escapes backticks that start none. Returns the
+/// index after them.
 fn code_span(text: &[char], start: usize, escaped: &mut String) -> usize {
     let ticks = |from: usize| text[from..].iter().take_while(|c| **c == '`').count();
     let length = ticks(start);

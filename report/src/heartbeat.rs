@@ -44,8 +44,8 @@ impl Heartbeat {
         Self::every(INTERVAL, move |elapsed| line_during(&work, elapsed), print)
     }
 
-    /// Starts to `print` lines about a whole command, while no other heartbeat prints about a part of
-    /// it.
+    /// Starts to `print` lines about a whole command, while no other heartbeat prints about a part
+    /// of it.
     pub fn of_command(command: String, print: impl Fn(&str) + Send + 'static) -> Self {
         Self::of_command_every(INTERVAL, command, print)
     }

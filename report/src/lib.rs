@@ -2,8 +2,10 @@
 //! evaluate, and reports that a CI gate reads.
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure
-//! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
-//! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
+//! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected
+//!   samples
+//! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it
+//!   gives
 //! * [`exchange`]: runs and scenarios in the formats of other tools: OpenSCENARIO, OpenDRIVE
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys

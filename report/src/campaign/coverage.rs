@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 /// Largest number of holes that a text names.
 const NAMED_HOLES: usize = 5;
 
-/// What the samples cover, one line for each item and cross. Empty if no scenario states what is to be covered.
+/// What the samples cover, one line for each item and cross. Empty if no scenario states what is to
+/// be covered.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverageText<'a>(pub &'a Judgement);
 

@@ -11,9 +11,10 @@
 //! The failures are the failed gates and requirement checks, and nothing else. Samples stand in
 //! `samples.xml`.
 //!
-//! By the convention of JUnit, the time of a suite is the sum of the times of its cases, and not the
-//! time on the clock while they ran side by side. The time of a suite is the time of its samples, summed
-//! over all threads. Its cases are judged on the same samples: each has an equal share of the time.
+//! By the convention of JUnit, the time of a suite is the sum of the times of its cases, and not
+//! the time on the clock while they ran side by side. The time of a suite is the time of its
+//! samples, summed over all threads. Its cases are judged on the same samples: each has an equal
+//! share of the time.
 //!
 //! Both files are valid by the schema of Jenkins' plugin xUnit (`junit-10.xsd`). The library
 //! `quick-junit` does not write them: version 0.8.0 adds `skipped` to `testsuites`, which the

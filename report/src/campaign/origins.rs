@@ -109,8 +109,8 @@ impl Origins {
         })
     }
 
-    /// Returns how many lane changes became scenarios, and why the others did not, the most frequent reason
-    /// first.
+    /// Returns how many lane changes became scenarios, and why the others did not, the most
+    /// frequent reason first.
     pub fn choice_sentence(&self) -> String {
         let changes: usize = self.files.iter().map(|file| file.lane_changes).sum();
         let mut refused: Vec<(&String, usize)> = self.refused.iter().map(|(reason, count)| (reason, *count)).collect();

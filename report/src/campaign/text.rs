@@ -68,13 +68,13 @@ impl fmt::Display for FlakyText<'_> {
 
 /// Largest number of reasons that are all below the sentence of the verdict: they fit on a screen.
 const MOST_TOGETHER: usize = 12;
-/// Largest number of reasons below the sentence if there are more: with the paths of the written files, they fit on a
-/// screen even if each takes a few lines.
+/// Largest number of reasons below the sentence if there are more: with the paths of the written
+/// files, they fit on a screen even if each takes a few lines.
 const MOST_BELOW: usize = 5;
 
-/// The verdict in one sentence, with its reasons in plain words: below it the gates that are not met, the worst first.
-/// If there are many reasons, gates that are met and remarks on single scenarios come before the sentence, so that the
-/// last screen of the output has the verdict.
+/// The verdict in one sentence, with its reasons in plain words: below it the gates that are not
+/// met, the worst first. If there are many reasons, gates that are met and remarks on single
+/// scenarios come before the sentence, so that the last screen of the output has the verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictText<'a> {
     /// The verdict.

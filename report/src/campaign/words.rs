@@ -6,8 +6,9 @@
 //!    NOT MET: cut-in-into-margin: MIS-6: …
 //! ```
 //!
-//! The page, the summary and the terminal have the same words, and the same order of the gates. Gates that are met and
-//! remarks on single scenarios are folded on the page and in the summary. On the terminal, many are above it.
+//! The page, the summary and the terminal have the same words, and the same order of the gates.
+//! Gates that are met and remarks on single scenarios are folded on the page and in the summary. On
+//! the terminal, many are above it.
 
 use closecall_campaign::gate::{Answer, Certainty, Evaluation, GateResult, GateSource, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};

@@ -43,9 +43,9 @@ const LINE: RGBColor = RGBColor(0x11, 0x11, 0x11);
 const LINE_PX: u32 = 2;
 const POINT_PX: i32 = 3;
 
-/// Returns the SVG of a boundary: runs with the event orange, without it grey, without a value black;
-/// the places where the event happens in light orange, and the band in which this is not decided in
-/// grey.
+/// Returns the SVG of a boundary: runs with the event orange, without it grey, without a value
+/// black; the places where the event happens in light orange, and the band in which this is not
+/// decided in grey.
 pub(crate) fn boundary_map(map: &BoundaryMap<'_>) -> io::Result<String> {
     let names = map.names.map(labelled);
     let axis = |index: usize| ChartAxis {

@@ -1,4 +1,5 @@
-//! Draws distributions: of each margin, by arm, and of each sampled value, by the fate of the sample.
+//! Draws distributions: of each margin, by arm, and of each sampled value, by the fate of the
+//! sample.
 
 use std::io;
 

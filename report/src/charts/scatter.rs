@@ -80,8 +80,9 @@ pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) ->
     drawn.map_err(|error| io::Error::other(error.to_string()))
 }
 
-/// Returns the offset of the label of each point from its centre (px), by the centres (px) and the numbers of letters.
-/// No label covers another label, a point, or the edge of the chart. A label without room has none.
+/// Returns the offset of the label of each point from its centre (px), by the centres (px) and the
+/// numbers of letters. No label covers another label, a point, or the edge of the chart. A label
+/// without room has none.
 fn places(centres: &[(i32, i32)], lengths: &[usize]) -> Vec<Option<(i32, i32)>> {
     let overlap = |[left, top, right, bottom]: [i32; 4], other: [i32; 4]| {
         left < other[2] && other[0] < right && top < other[3] && other[1] < bottom
@@ -129,7 +130,8 @@ mod tests {
 
     #[test]
     fn labels_of_points_close_to_each_other_cover_no_label_and_no_point() {
-        // Four combinations of a frontier, two of them almost at one place, and one at the right edge.
+        // Four combinations of a frontier, two of them almost at one place, and one at the right
+        // edge.
         let centres = [(400, 200), (403, 204), (420, 210), (840, 300)];
         let offsets = places(&centres, &[23; 4]);
         let areas: Vec<[i32; 4]> =

@@ -55,8 +55,9 @@ const AXIS: RGBColor = RGBColor(0x55, 0x5f, 0x6b);
 pub(super) const GRID: RGBColor = RGBColor(0xe3, 0xe7, 0xec);
 /// Shade of cells in which samples collide.
 pub(super) const COLLISIONS: RGBColor = RGBColor(0xd3, 0x54, 0x00);
-/// Colour of samples without a collision, and of bars that say little. Its contrast is 3 : 1 or more
-/// on a white sheet, and, with the lightness inverted, on the sheet of a dark page (WCAG 2.2, 1.4.11).
+/// Colour of samples without a collision, and of bars that say little. Its contrast is 3 : 1 or
+/// more on a white sheet, and, with the lightness inverted, on the sheet of a dark page (WCAG 2.2,
+/// 1.4.11).
 pub(super) const GREY: RGBColor = RGBColor(0x7d, 0x88, 0x95);
 const BLUE: RGBColor = RGBColor(0x1f, 0x77, 0xb4);
 const ORANGE: RGBColor = RGBColor(0xde, 0x77, 0x17);
@@ -191,9 +192,9 @@ fn svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> Drawn<S
     drawn.map(|()| text)
 }
 
-/// Returns the SVG of a chart of this size (px) that can stand in a file of its own. It has a white background: viewers
-/// show what is not drawn in any colour, some in black. The style sheet of the pages leaves the background out where a
-/// page is dark.
+/// Returns the SVG of a chart of this size (px) that can stand in a file of its own. It has a white
+/// background: viewers show what is not drawn in any colour, some in black. The style sheet of the
+/// pages leaves the background out where a page is dark.
 pub(crate) fn file_svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> Drawn<String> {
     svg(size_px, |canvas| canvas.fill(&WHITE).and_then(|()| paint(canvas)))
 }
@@ -249,7 +250,8 @@ mod tests {
         one.max(other) / one.min(other)
     }
 
-    /// The colour behind the style sheet's `invert(1) hue-rotate(180deg)` (Filter Effects Module 1).
+    /// The colour behind the style sheet's `invert(1) hue-rotate(180deg)` (Filter Effects Module
+    /// 1).
     fn inverted(colour: [f64; 3]) -> [f64; 3] {
         let from = colour.map(|channel| 255.0 - channel);
         [[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]].map(|weights: [f64; 3]| {
@@ -295,7 +297,8 @@ mod tests {
         let paint = |canvas: &Canvas<'_>| canvas.draw(&Circle::new((5, 5), 2, BLACK));
         let map = scaled(MAP_PX, WIDEST_MAP_PX, paint).unwrap().into_string();
         assert!(map.starts_with("<svg style=\"max-width:620px\" viewBox=\"0 0 400 360\""), "{map}");
-        // The frame of a page of 390 px is 360 px wide, and letters are smaller than their font size (see `LABEL_PX`).
+        // The frame of a page of 390 px is 360 px wide, and letters are smaller than their font
+        // size (see `LABEL_PX`).
         assert!(f64::from(LABEL_PX) / 1.24 * 360.0 / f64::from(MAP_PX.0) > 9.0);
     }
 }

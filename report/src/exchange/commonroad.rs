@@ -64,8 +64,8 @@ fn point(x_m: f64, y_m: f64) -> Element {
     Element::new("point").child(text("x", x_m)).child(text("y", y_m))
 }
 
-/// Returns a lane, or `None` if the acceleration lane ends before the part of the road that is used.
-/// Lanelets beside each other have the same ends: the acceleration lane is beside none.
+/// Returns a lane, or `None` if the acceleration lane ends before the part of the road that is
+/// used. Lanelets beside each other have the same ends: the acceleration lane is beside none.
 fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Option<Element> {
     let [start_m, mut end_m] = road.range_m();
     let entry = scenario.road.entry_lane();

@@ -5,7 +5,8 @@
 //!  OpenDRIVE   t = 0 ─ reference line ─▶ s − s₀   lane −1, −2, … −n
 //! ```
 //!
-//! If the alignment lies beside the left edge, it is the reference line, and the lanes have an offset.
+//! If the alignment lies beside the left edge, it is the reference line, and the lanes have an
+//! offset.
 //!
 //! An acceleration lane is lane −n, in three lane sections: with the full width, with a width that
 //! falls to 0, and without the lane. Before the lane begins, the marking to its left is solid. If
@@ -242,7 +243,8 @@ mod tests {
         assert_eq!(count(&text, "a=\"3.75\" b=\"-0.0625\""), 1);
         // Lanes 1 and 2 go on at both ends of the middle section; lane 3 does at its start alone.
         assert_eq!((count(&text, "<successor"), count(&text, "<predecessor")), (5, 5));
-        // The marking is broken from the end of the ramp on, 600 m behind the start of the file's road.
+        // The marking is broken from the end of the ramp on, 600 m behind the start of the file's
+        // road.
         let first = text.split("<laneSection").nth(1).unwrap();
         assert_eq!(count(first, "sOffset=\"600\" type=\"broken\""), 1, "{first}");
     }
@@ -285,7 +287,8 @@ mod tests {
         let passed = AccelerationLane { from_m: -2_000.0, to_m: -1_000.0, taper_end_m: -900.0 };
         let text = document(&Road::straight(3).with_acceleration_lane(passed), 400.0);
         assert_eq!((count(&text, "<laneSection"), count(&text, "<lane id=\"-3\"")), (1, 0));
-        // On the right-overtaking side the lane is the leftmost, whose width the file does not change.
+        // On the right-overtaking side the lane is the leftmost, whose width the file does not
+        // change.
         let mirrored = Road::straight(3).with_acceleration_lane(ENTRY).mirrored().unwrap();
         assert_eq!(count(&document(&mirrored, 400.0), "<laneSection"), 1);
     }

@@ -74,7 +74,8 @@ pub(super) fn ranges(boundary: &Boundary) -> String {
     format!("{}, {}", range(0), range(1))
 }
 
-/// Returns the shares of the area, how well the runs are predicted, and what the intervals leave out.
+/// Returns the shares of the area, how well the runs are predicted, and what the intervals leave
+/// out.
 pub(super) fn statements(surveyed: &Surveyed) -> [String; 3] {
     let (area, check) = (surveyed.area, surveyed.check);
     let scatter = significant(Z_95 * surveyed.noise_sd, DIGITS);

@@ -36,8 +36,9 @@ pub(super) fn cells(point: &Point) -> [String; 5] {
     ]
 }
 
-/// Returns the combinations with samples in which only other vehicles collide, in a sentence: there,
-/// the other columns do not add up to the collisions with the system. `None` if there are none.
+/// Returns the combinations with samples in which only other vehicles collide, in a sentence:
+/// there, the other columns do not add up to the collisions with the system. `None` if there are
+/// none.
 pub(super) fn others(frontier: &Frontier) -> Option<String> {
     let of_point = |point: &Point| {
         let settings = frontier.keys.iter().zip(&point.values).map(|(key, value)| format!("{}={value}", short(key)));
@@ -94,7 +95,8 @@ impl Display for FrontierText<'_> {
 /// A value of a point with its interval.
 type Placed = (f64, [f64; 2]);
 
-/// Returns why a frontier has no chart and no mark, in a sentence. `None` if a sample collides without the system.
+/// Returns why a frontier has no chart and no mark, in a sentence. `None` if a sample collides
+/// without the system.
 pub(super) fn without_collisions(frontier: &Frontier) -> Option<String> {
     let baseline = frontier.controllers.first().map_or("", String::as_str);
     let is_without = |point: &Point| point.collisions_without == 0 && point.prevented.is_none();
@@ -137,7 +139,8 @@ mod tests {
 
     use super::*;
 
-    /// A frontier of two combinations. In the second, so many samples have a collision of other vehicles only.
+    /// A frontier of two combinations. In the second, so many samples have a collision of other
+    /// vehicles only.
     fn frontier(both_of_others: u64) -> Frontier {
         let point = |value: &str, both_of_others| Point {
             values: vec![value.to_owned()],

@@ -1,4 +1,5 @@
-//! Output of studies that vary a scenario: sensitivity studies, frontiers, boundaries, and the study against crash records.
+//! Output of studies that vary a scenario: sensitivity studies, frontiers, boundaries, and the
+//! study against crash records.
 //!
 //! ```text
 //!  Sensitivity ─▶ text │ sensitivity.json │ tornado-{output}.svg │ sensitivity.html

@@ -1,4 +1,5 @@
-//! The clusters and boxes of a run before any is rejected: a Parquet table with one row per cluster and per box of each scan.
+//! The clusters and boxes of a run before any is rejected: a Parquet table with one row per cluster
+//! and per box of each scan.
 //!
 //! ```text
 //!   points ─▶ DBSCAN ─▶ cluster ─▶ clusters of one vehicle merged, box fitted ─▶ box ─▶ class ─▶ tracker: corrects, starts, part, ignored
@@ -6,7 +7,8 @@
 //!                   row of kind `cluster`                                  row of kind `box` ◀── what has become of it
 //! ```
 //!
-//! The tracker takes a scan when its latency has elapsed, so that the fate of a box is filled in later.
+//! The tracker takes a scan when its latency has elapsed, so that the fate of a box is filled in
+//! later.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -246,7 +248,8 @@ impl Observer for ClusterRecorder {
     fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
-/// Returns the object that most of the points come from, and its share of them. Of two with the same share it is the first by name.
+/// Returns the object that most of the points come from, and its share of them. Of two with the
+/// same share it is the first by name.
 fn truth_of(points: &[u32], source: &dyn Fn(u32) -> PointSource, view: &StepView<'_>) -> Option<(String, f64)> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for &point in points {
@@ -289,7 +292,8 @@ impl ClusterWriter {
     /// Creates a writer of the Parquet file `path`.
     ///
     /// # Errors
-    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is another, or if no file can be created there.
+    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is another, or if
+    /// no file can be created there.
     pub fn new(path: &Path, mode: SensorMode) -> Result<Self, WriteError> {
         if mode != SensorMode::Full {
             let message = "there are no clusters: only sensors of mode `full` have LiDARs";
@@ -303,7 +307,8 @@ impl ClusterWriter {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`WriteError`] if a scan could not be clustered again, or if the file cannot be written completely.
+    /// [`WriteError`] if a scan could not be clustered again, or if the file cannot be written
+    /// completely.
     pub fn finish(self) -> Result<(), WriteError> {
         write_batch(&self.path, || self.clusters.batch())
     }

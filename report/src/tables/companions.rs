@@ -1,5 +1,5 @@
-//! What goes with the scans of a run, as CSV: the poses of the ego, the labels of the other vehicles, and the index of a folder of
-//! point clouds. `closecall_recorded::scans` reads them.
+//! What goes with the scans of a run, as CSV: the poses of the ego, the labels of the other
+//! vehicles, and the index of a folder of point clouds. `closecall_recorded::scans` reads them.
 //!
 //! Numbers are written such that they are read with the same bits.
 

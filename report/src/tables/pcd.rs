@@ -12,9 +12,10 @@
 //! | `time` | F 8 | time of measurement (s) |
 //! | `echo_pulse_width_ns` | F 4 | as in the table |
 //!
-//! `scans.csv` lists the files with the end of each scan, and `poses.csv` and `labels.csv` have the poses of the ego and the other
-//! vehicles (`crate::tables::companions`). The points are already in the ego's frame, so the viewpoint of each file is the identity. The
-//! format has no place for some columns (direction, range, box, truth): only the table has them.
+//! `scans.csv` lists the files with the end of each scan, and `poses.csv` and `labels.csv` have the
+//! poses of the ego and the other vehicles (`crate::tables::companions`). The points are already in
+//! the ego's frame, so the viewpoint of each file is the identity. The format has no place for some
+//! columns (direction, range, box, truth): only the table has them.
 
 use std::fs;
 use std::io::{self, Write};

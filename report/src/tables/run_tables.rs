@@ -34,8 +34,8 @@ impl RunTables {
     /// Creates the writers of the files of a run in this arm, whose extensions give the formats.
     ///
     /// # Errors
-    /// [`WriteError`] if an extension is wrong, if a file cannot be created, or if scans or clusters are requested of an arm without a
-    /// LiDAR.
+    /// [`WriteError`] if an extension is wrong, if a file cannot be created, or if scans or
+    /// clusters are requested of an arm without a LiDAR.
     pub fn new((scenario, arm): (&Scenario, Option<&Arm>), files: TableFiles<'_>) -> Result<Self, WriteError> {
         let mode = arm.and_then(|arm| arm.sensors).unwrap_or_else(|| scenario.sensors.mode());
         Ok(Self {

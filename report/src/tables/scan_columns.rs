@@ -46,8 +46,8 @@ impl ScanColumns {
         self.frame.len()
     }
 
-    /// Appends the latest scan of a LiDAR, which must be complete, as its scan number `frame`. `actor`
-    /// names an actor.
+    /// Appends the latest scan of a LiDAR, which must be complete, as its scan number `frame`.
+    /// `actor` names an actor.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "angles in single precision, as the pattern; fewer clusters than points"

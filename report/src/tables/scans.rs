@@ -17,9 +17,10 @@
 //! | `cluster` | number of the box that the point belongs to; null for ground, rails and noise |
 //! | `source`, `true_range_m` | the truth: the name of the actor, or `ground`, `guard-rail`, `spray`, `fog`, `false`; and the range without noise (m) |
 //!
-//! The scans are complete: they have the returns of the bare road, which a simulation leaves out because the detector discards them.
-//! They begin with the second before the start in which the sensors settle. With the poses and the labels beside them
-//! (`crate::tables::companions`), they are a recording from which the processing chain gives the same tracks again.
+//! The scans are complete: they have the returns of the bare road, which a simulation leaves out
+//! because the detector discards them. They begin with the second before the start in which the
+//! sensors settle. With the poses and the labels beside them (`crate::tables::companions`), they
+//! are a recording from which the processing chain gives the same tracks again.
 
 use std::fs::File;
 use std::io::{self, Seek};

@@ -61,7 +61,8 @@ pub fn check_parquet(path: &Path, message: &'static str) -> Result<(), WriteErro
 /// Writes a record batch as a Parquet file.
 ///
 /// # Errors
-/// [`WriteError`] if there is no batch, or if the file cannot be written. An existing file then stays as it is.
+/// [`WriteError`] if there is no batch, or if the file cannot be written. An existing file then
+/// stays as it is.
 pub fn write_batch(path: &Path, batch: impl FnOnce() -> io::Result<RecordBatch>) -> Result<(), WriteError> {
     let batch = batch().map_err(|error| WriteError::new(path, error))?;
     write_file(path, |file| {

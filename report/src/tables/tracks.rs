@@ -1,7 +1,9 @@
-//! The tracks of a run: a Parquet table with one row per control step and track, beside the vehicle that each is matched with.
+//! The tracks of a run: a Parquet table with one row per control step and track, beside the vehicle
+//! that each is matched with.
 //!
-//! The rows hold all that a test of the tracker's consistency needs: state, covariance, and the errors of the nearest face. The
-//! matching is that of [`TrackAudit`](closecall_sensors::TrackAudit).
+//! The rows hold all that a test of the tracker's consistency needs: state, covariance, and the
+//! errors of the nearest face. The matching is that of
+//! [`TrackAudit`](closecall_sensors::TrackAudit).
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,7 +18,8 @@ use closecall_traffic::{ClassScores, Source, Time, Track, TrackStatus, VehicleCl
 
 use crate::tables::table::{check_parquet, field, required, write_batch};
 
-/// The columns of the upper triangle of the covariance of `[x, y, vx, vy]`, with row, column and unit.
+/// The columns of the upper triangle of the covariance of `[x, y, vx, vy]`, with row, column and
+/// unit.
 const COVARIANCE: [(&str, [usize; 2], &str); 10] = [
     ("cov_x_x", [0, 0], "m²"),
     ("cov_x_y", [0, 1], "m²"),
@@ -54,8 +57,8 @@ pub struct TrackRecorder {
 }
 
 impl TrackRecorder {
-    /// Appends the tracks of one step of a recording. `truth` has the vehicles that its labels show,
-    /// if there are any, with the name of each.
+    /// Appends the tracks of one step of a recording. `truth` has the vehicles that its labels
+    /// show, if there are any, with the name of each.
     pub fn record(&mut self, (time, tracks): (Time, &[Track]), truth: Option<(&Scene<'_>, &dyn Fn(usize) -> String)>) {
         match truth {
             None => self.append((time, tracks), Ok(vec![None; tracks.len()]), &|actor| actor.to_string()),
@@ -221,7 +224,8 @@ impl TrackWriter {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`WriteError`] if the truth of a step was not finite, or if the file cannot be written completely.
+    /// [`WriteError`] if the truth of a step was not finite, or if the file cannot be written
+    /// completely.
     pub fn finish(self) -> Result<(), WriteError> {
         write_batch(&self.path, || self.tracks.batch())
     }

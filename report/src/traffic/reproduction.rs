@@ -5,12 +5,12 @@
 //! recording, all parameters but cc0 and cc6 are. If these do not either, the lane change is not
 //! sampled: its steps would vary another manoeuvre than the recorded one.
 //!
-//! **Bounds.** They hold from the start to the end of the lane change. The error along the road is the
-//! mixed relative error of Kesting and Treiber, *Calibrating Car-Following Models by Using Trajectory
-//! Data*, Transportation Research Record 2088 (2008), √(⟨Δs²/s⟩/⟨s⟩): at most 29 %, the largest error
-//! that they report for calibrated models. Where nobody is ahead, s is the gap that Wiedemann 99 keeps
-//! with its published parameters. The root mean square across the road is at most 0.28 m, the standard
-//! deviation with which the drivers of US-101 weave in their lanes.
+//! **Bounds.** They hold from the start to the end of the lane change. The error along the road is
+//! the mixed relative error of Kesting and Treiber, *Calibrating Car-Following Models by Using
+//! Trajectory Data*, Transportation Research Record 2088 (2008), √(⟨Δs²/s⟩/⟨s⟩): at most 29 %, the
+//! largest error that they report for calibrated models. Where nobody is ahead, s is the gap that
+//! Wiedemann 99 keeps with its published parameters. The root mean square across the road is at
+//! most 0.28 m, the standard deviation with which the drivers of US-101 weave in their lanes.
 
 use std::fmt;
 use std::path::Path;
@@ -51,7 +51,8 @@ pub struct Reproduction {
     pub desired_speed_mps: Option<f64>,
     /// The calibrated cc1 (s).
     pub cc1_s: Option<f64>,
-    /// The first collision of the vehicle that changes lanes before the end of its lane change, if there is one.
+    /// The first collision of the vehicle that changes lanes before the end of its lane change, if
+    /// there is one.
     pub collision: Option<String>,
 }
 
@@ -108,8 +109,8 @@ impl Reproduction {
     }
 }
 
-/// Returns a value that is shown with two digits: one beyond its bound is rounded up, so that it does not look
-/// like the bound.
+/// Returns a value that is shown with two digits: one beyond its bound is rounded up, so that it
+/// does not look like the bound.
 fn shown_beyond(value: f64, bound: f64) -> f64 {
     if value > bound { (100.0 * value).ceil() / 100.0 } else { value }
 }
@@ -145,7 +146,8 @@ impl fmt::Display for Reproduction {
 /// Step 0 of a sampled lane change.
 #[derive(Clone, Debug)]
 pub struct StepZero {
-    /// The encounter, without vehicles whose recorded movements would end the run before the lane change.
+    /// The encounter, without vehicles whose recorded movements would end the run before the lane
+    /// change.
     pub encounter: RecordedEncounter,
     /// The calibrated driver.
     pub driver: Wiedemann99Config,
@@ -170,12 +172,12 @@ pub enum StepZeroError {
     NotReproduced(Box<Reproduction>),
 }
 
-/// Calibrates the driver of an encounter, and runs step 0. The second argument holds the path that names
-/// the source in error messages, and further settings.
+/// Calibrates the driver of an encounter, and runs step 0. The second argument holds the path that
+/// names the source in error messages, and further settings.
 ///
-/// A run ends with the first collision. Recorded positions of two other vehicles may overlap, or do so after
-/// the end of a record, when a vehicle keeps its last speed. If the run then ends before the vehicle crosses
-/// the marking, one of the two is left out.
+/// A run ends with the first collision. Recorded positions of two other vehicles may overlap, or do
+/// so after the end of a record, when a vehicle keeps its last speed. If the run then ends before
+/// the vehicle crosses the marking, one of the two is left out.
 ///
 /// # Errors
 /// [`StepZeroError`] if the step cannot be run, or if no driver reproduces the recording.
@@ -197,8 +199,8 @@ pub fn step_zero(
     }
 }
 
-/// Returns the index of a vehicle without a role that collides with another one before the vehicle that
-/// changes lanes crosses the marking.
+/// Returns the index of a vehicle without a role that collides with another one before the vehicle
+/// that changes lanes crosses the marking.
 fn in_collision(encounter: &RecordedEncounter, run: &SampledRun) -> Option<usize> {
     let [one, other] = run.others_in_collision.as_ref().filter(|_| run.crossing_s.is_none())?;
     let index_of = |name: &String| {
@@ -209,7 +211,8 @@ fn in_collision(encounter: &RecordedEncounter, run: &SampledRun) -> Option<usize
     index_of(other).or_else(|| index_of(one))
 }
 
-/// Returns the step 0 of the calibrated driver that reproduces the recording, or else of the closer one.
+/// Returns the step 0 of the calibrated driver that reproduces the recording, or else of the closer
+/// one.
 fn closest(
     encounter: &RecordedEncounter,
     (source, settings): (&Path, &[Setting]),
@@ -226,8 +229,8 @@ fn closest(
         let driver = calibrate_replaced(encounter, &ahead, calibrated);
         let step = built(&driver)?;
         let run = run_step(encounter, ("step 0".to_owned(), None), &step, seed)?;
-        // A collision of two other vehicles is one of their recorded positions. It matters if the run ends with it
-        // before the crossing.
+        // A collision of two other vehicles is one of their recorded positions. It matters if the
+        // run ends with it before the crossing.
         let collision = run.run.collision.as_ref().filter(|(_, time_s)| *time_s <= until.s());
         let collision = collision.map(|(other, time_s)| format!("it collides with {other} at {time_s:.2} s"));
         let reproduction = Reproduction::new([&recorded, &run.run], &ahead, (&driver, calibrated), collision);

@@ -1,6 +1,6 @@
-//! A sampled lane change, as a table and a figure. For each value of the varied parameter, they show
-//! the path of the vehicle that changes lanes, and its time headways to the vehicle that it overtakes
-//! (Opp₁) and to the vehicle that has overtaken it (Opp₂).
+//! A sampled lane change, as a table and a figure. For each value of the varied parameter, they
+//! show the path of the vehicle that changes lanes, and its time headways to the vehicle that it
+//! overtakes (Opp₁) and to the vehicle that has overtaken it (Opp₂).
 //!
 //! The headway to Opp₁ counts from the start of the lane change until the centre of the vehicle
 //! that changes lanes crosses the marking, as long as Opp₁ is ahead in the same lane. The headway
@@ -39,7 +39,8 @@ const FIGURE_PX: (u32, u32) = (900, 1_260);
 /// One run of a sampled lane change, or the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampledRun {
-    /// The varied parameter with its value; `recorded` for the recorded lane change, `step 0` for the calibrated driver.
+    /// The varied parameter with its value; `recorded` for the recorded lane change, `step 0` for
+    /// the calibrated driver.
     pub name: String,
     /// Value of the varied parameter; `None` for the recorded lane change and for step 0.
     pub value: Option<f64>,
@@ -144,7 +145,8 @@ impl SampledRun {
 }
 
 impl SampledRun {
-    /// Returns the largest distances along and across the road from another run at the same time (m).
+    /// Returns the largest distances along and across the road from another run at the same time
+    /// (m).
     fn furthest_from(&self, other: &Self) -> (f64, f64) {
         let mut furthest = (0.0_f64, 0.0_f64);
         let mut others = self.positions.iter().peekable();
@@ -158,8 +160,8 @@ impl SampledRun {
     }
 }
 
-/// Returns the time (s) and the time headway (s) of `own` to `other` at each instant that counts, if `other` is entirely
-/// ahead in `lane`.
+/// Returns the time (s) and the time headway (s) of `own` to `other` at each instant that counts,
+/// if `other` is entirely ahead in `lane`.
 fn headways(own: &Trajectory, other: &Trajectory, lane: Lane, counts: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
     let lengths_m = [own.dimensions.length_m, other.dimensions.length_m];
     let at = |point: &TrajectoryPoint| {
@@ -298,8 +300,9 @@ impl Sampled {
         }
     }
 
-    /// Returns what a reader has to know of the runs: how well step 0 reproduces the recording, opponents whose record
-    /// ends, runs that never cross the marking, and a parameter that changes nothing.
+    /// Returns what a reader has to know of the runs: how well step 0 reproduces the recording,
+    /// opponents whose record ends, runs that never cross the marking, and a parameter that changes
+    /// nothing.
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = vec![self.reproduction.to_string()];
         for (track_id, end_s) in &self.ends {

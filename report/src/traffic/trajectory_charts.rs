@@ -13,7 +13,8 @@ use crate::charts::style::{
 const FAINT_OPACITY: f64 = 0.35;
 /// Length of a line in the legend (px).
 const LEGEND_LINE_PX: i32 = 18;
-/// Width of the area for a legend beside the lines, as a share of the width of the lines (-): a legend takes 190 px of 800 px.
+/// Width of the area for a legend beside the lines, as a share of the width of the lines (-): a
+/// legend takes 190 px of 800 px.
 const LEGEND_SHARE: f64 = 0.33;
 /// Largest number of points of a line that are drawn as dots.
 const MAX_DOTS: usize = 50;

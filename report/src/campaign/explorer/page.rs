@@ -60,8 +60,8 @@ struct FateStyle {
 pub enum PagePlace {
     /// A program serves it, and is asked for the samples that are chosen.
     Served,
-    /// In a file. The path leads from there to the campaign's folder, and is empty or ends with `/`; without it the page links no
-    /// file of the folder.
+    /// In a file. The path leads from there to the campaign's folder, and is empty or ends with
+    /// `/`; without it the page links no file of the folder.
     File(Option<String>),
 }
 

@@ -7,7 +7,8 @@ use maud::{Markup, html};
 use super::page::{number, number_heads, table, text_heads};
 use crate::units::labelled;
 
-/// Returns the tables of a scenario: items and crosses, then the bins of each. Empty if it states nothing.
+/// Returns the tables of a scenario: items and crosses, then the bins of each. Empty if it states
+/// nothing.
 pub(super) fn tables(judged: &Judgement, scenario: &str) -> Markup {
     let results = judged.coverage.iter().find(|(name, _)| name == scenario).map_or(&[][..], |(_, results)| results);
     html! {

@@ -1,7 +1,8 @@
 //! The counts: how often the ego collides in each arm, the confidence of this rate, and the changes
 //! by the system under test.
 //!
-//! Many scenarios have a row each, those with the worst gates first. Intervals, bars and causes are folded then.
+//! Many scenarios have a row each, those with the worst gates first. Intervals, bars and causes are
+//! folded then.
 
 use super::super::text::{goals, imposed, not_prevented};
 use std::cmp::Reverse;
@@ -20,7 +21,8 @@ use closecall_campaign::summary::{Counts, Summary};
 use closecall_traffic::statistics::format::percent;
 use closecall_traffic::words::counted;
 
-/// Number of rows of the table on the screen if there are many scenarios. The others are folded. Paper has all rows.
+/// Number of rows of the table on the screen if there are many scenarios. The others are folded.
+/// Paper has all rows.
 const ROWS: usize = 6;
 
 /// Returns the counts of the campaign.
@@ -53,8 +55,8 @@ struct Row<'a> {
     gates: [usize; 2],
 }
 
-/// Returns the scenarios: most missed gates first, then most induced collisions and most collisions of the arm under
-/// test.
+/// Returns the scenarios: most missed gates first, then most induced collisions and most collisions
+/// of the arm under test.
 fn worst_first<'a>(findings: &Findings<'a>) -> Vec<Row<'a>> {
     let of_standing = |name: &str, standing: Standing| {
         findings.judged.gates.iter().filter(|gate| gate.scenario == name && gate.standing() == standing).count()

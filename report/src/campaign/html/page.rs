@@ -23,7 +23,8 @@ pub fn document(title: &str, body: &Markup) -> Markup {
     }
 }
 
-/// Returns the head of the page of a study: its title, a line about it, and the settings of its scenario.
+/// Returns the head of the page of a study: its title, a line about it, and the settings of its
+/// scenario.
 pub fn head(title: &str, settings: &[String], line: &str) -> Markup {
     html! {
         header {
@@ -81,8 +82,8 @@ fn with_names(names: &[String], rows: &str) -> String {
     named
 }
 
-/// Returns an expression that a browser breaks only between words: at spaces, after `_` and `(`, and after a `.` between
-/// names.
+/// Returns an expression that a browser breaks only between words: at spaces, after `_` and `(`,
+/// and after a `.` between names.
 pub(crate) fn breakable(expression: &str) -> Markup {
     let mut last = ' ';
     let ends_word = |letter: char| {
@@ -177,7 +178,8 @@ mod tests {
         }
         // What is copied from the page is the expression.
         assert_eq!(written.replace("<wbr>", "").replace("&gt;", ">").replace("&lt;", "<"), expression);
-        // The style sheet leaves the pieces whole: `anywhere` would let a column be narrower than a word.
+        // The style sheet leaves the pieces whole: `anywhere` would let a column be narrower than a
+        // word.
         assert!(STYLE.contains("\n.gates code { overflow-wrap: break-word; }\n"));
     }
 

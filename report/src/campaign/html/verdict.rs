@@ -24,8 +24,8 @@ const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
 const STATED: usize = 3;
 /// Largest number of lines below the sentence in the head of the page. Further remarks are folded.
 const REMARKS: usize = 6;
-/// Largest numbers of gates of the first table that are not met, and that are undecided beside them or alone. The
-/// others are folded. With these, a printed page has the verdict and the first gates.
+/// Largest numbers of gates of the first table that are not met, and that are undecided beside them
+/// or alone. The others are folded. With these, a printed page has the verdict and the first gates.
 const MISSED: usize = 24;
 const UNDECIDED_BESIDE: usize = 6;
 const UNDECIDED_ALONE: usize = 12;
@@ -73,8 +73,8 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     }
 }
 
-/// Returns the counts in one sentence: the changes by the system under test, or the collisions if the
-/// campaign has no baseline.
+/// Returns the counts in one sentence: the changes by the system under test, or the collisions if
+/// the campaign has no baseline.
 fn headline(findings: &Findings<'_>) -> String {
     let total = findings.summary.total();
     if !findings.summary.is_paired() {

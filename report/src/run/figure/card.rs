@@ -1,6 +1,6 @@
 //! The incident card of a sample: one page for a ticket, which loads nothing. It has the event and
-//! its cause in one sentence for each arm, by whom each collision was avoidable, both arms from above
-//! in real time, the headways, and the command that runs the sample again.
+//! its cause in one sentence for each arm, by whom each collision was avoidable, both arms from
+//! above in real time, the headways, and the command that runs the sample again.
 //!
 //! The animation is SMIL, part of SVG, and needs no script.
 
@@ -33,7 +33,8 @@ const CAPITAL: f64 = 0.73;
 const PLOT_PX: [f64; 2] = [380.0, 150.0];
 const FONT_PX: f64 = 12.0;
 const MARGIN_PX: f64 = 26.0;
-/// Base line of the title of a plot of headways (px): above the plot, which begins at half the margin.
+/// Base line of the title of a plot of headways (px): above the plot, which begins at half the
+/// margin.
 const TITLE_BASE_PX: f64 = 10.0;
 /// Upper end of the axis of headways (s).
 const MOST_THW_S: f64 = 4.0;
@@ -160,8 +161,8 @@ fn vehicle(film: &Film, actor: usize, window: Window) -> Markup {
     }
 }
 
-/// Returns a curve as the path of an SVG file. It is interrupted where there is no point, and where the
-/// next point belongs to another vehicle.
+/// Returns a curve as the path of an SVG file. It is interrupted where there is no point, and where
+/// the next point belongs to another vehicle.
 fn path(points: impl Iterator<Item = Option<(Option<usize>, [f64; 2])>>) -> String {
     let mut path = String::new();
     let (mut is_open, mut last) = (false, None);

@@ -158,7 +158,8 @@ pub(super) fn tick_text(value: f64) -> String {
     without_trailing_zeros(&format!("{value:.2}")).replace('-', "\u{2212}")
 }
 
-/// Returns a range that contains all finite `values` and the range `at_least`, with some room beyond the values.
+/// Returns a range that contains all finite `values` and the range `at_least`, with some room
+/// beyond the values.
 pub(super) fn range_of(values: impl Iterator<Item = f64>, at_least: Range) -> Range {
     let finite = values.filter(|value| value.is_finite());
     let [low, high] = finite.fold(at_least, |[low, high], value| [low.min(value), high.max(value)]);

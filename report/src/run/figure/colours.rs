@@ -2,8 +2,8 @@
 
 use crate::run::film::{Film, Part};
 
-// Each actor has its hue of the Rerun recordings, in a darker shade: names in these colours have a contrast of 4.5 : 1
-// or more on white paper and on asphalt (WCAG 2.2, 1.4.3).
+// Each actor has its hue of the Rerun recordings, in a darker shade: names in these colours have a
+// contrast of 4.5 : 1 or more on white paper and on asphalt (WCAG 2.2, 1.4.3).
 
 /// Colour of the ego.
 pub(super) const EGO: &str = "#1a62bb";

@@ -221,9 +221,9 @@ fn frames_shown(films: &[Film], film: &Film) -> std::ops::Range<usize> {
 }
 
 /// Returns a curve over time for each film and each of `curves`, which are pairs of a name and a
-/// colour: the first of the vehicle ahead, the second of the vehicle behind. `value` reads the value
-/// of the curve with the given index from a frame. A curve is interrupted where another vehicle
-/// begins.
+/// colour: the first of the vehicle ahead, the second of the vehicle behind. `value` reads the
+/// value of the curve with the given index from a frame. A curve is interrupted where another
+/// vehicle begins.
 fn over_time(
     films: &[Film],
     curves: &[(&str, &'static str)],

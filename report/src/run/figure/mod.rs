@@ -32,8 +32,8 @@ pub(crate) use scrubber::scrubber;
 pub use still::still;
 pub(crate) use timeline::timeline;
 
-/// Returns whether a curve goes over to another vehicle. A vehicle in the path of the ego, and not yet
-/// in its lane, is no other one.
+/// Returns whether a curve goes over to another vehicle. A vehicle in the path of the ego, and not
+/// yet in its lane, is no other one.
 pub(in crate::run) fn is_another(last: Option<usize>, now: Option<usize>) -> bool {
     matches!((last, now), (Some(last), Some(now)) if last != now)
 }

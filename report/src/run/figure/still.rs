@@ -88,7 +88,8 @@ pub fn still(film: &Film) -> String {
     svg.finish()
 }
 
-/// Breaks a text at spaces into lines of at most this many letters. A longer word has a line of its own.
+/// Breaks a text at spaces into lines of at most this many letters. A longer word has a line of its
+/// own.
 fn wrapped(text: &str, letters: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {

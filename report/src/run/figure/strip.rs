@@ -174,9 +174,9 @@ impl Strip<'_> {
         self.at(state.s_m + along * 0.5 * size.length_m, state.d_m + across * 0.5 * size.width_m)
     }
 
-    /// Writes the name and the speed of the ego, the lead and the rear vehicle in the picture, and of each vehicle
-    /// that collides. `occupied` has the areas of other texts. A label covers no other text, and no body
-    /// if there is room elsewhere. A label without room is left out.
+    /// Writes the name and the speed of the ego, the lead and the rear vehicle in the picture, and
+    /// of each vehicle that collides. `occupied` has the areas of other texts. A label covers no
+    /// other text, and no body if there is room elsewhere. A label without room is left out.
     fn labels(&self, svg: &mut Svg, present: &[usize], occupied: &mut Vec<Area>) {
         let bodies: Vec<Area> = present.iter().map(|&actor| self.body(actor)).collect();
         let is_other = |actor: &usize| *actor != self.film.ego;

@@ -113,7 +113,8 @@ pub struct Frame {
     /// Detections of the left and of the right rear radar, in the frames with a new scan; none
     /// below [`Level::Objects`].
     pub(in crate::run) radar_returns: Option<[Vec<RadarReturn>; 2]>,
-    /// Image of the rear camera that a network has evaluated as a whole, in the frames in which one was taken; none below [`Level::Full`].
+    /// Image of the rear camera that a network has evaluated as a whole, in the frames in which one
+    /// was taken; none below [`Level::Full`].
     pub(in crate::run) rear_image: Option<RearImage>,
 }
 
@@ -257,8 +258,8 @@ impl Film {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.collisions)
     }
 
-    /// Returns true if a drawing from above has the name of a vehicle: the ego, the lead vehicle and the rear vehicle have
-    /// one, and each vehicle that collides.
+    /// Returns true if a drawing from above has the name of a vehicle: the ego, the lead vehicle
+    /// and the rear vehicle have one, and each vehicle that collides.
     pub(in crate::run) fn is_labelled(&self, actor: usize) -> bool {
         matches!(self.actors[actor].part, Part::Ego | Part::Lead | Part::Rear) || self.collides(actor)
     }
@@ -269,7 +270,8 @@ impl Film {
         self.collisions().iter().any(|collision| collision.between.iter().any(|id| id.as_str() == name))
     }
 
-    /// Returns the first collision of the ego or, if there is none, the first collision of any vehicles.
+    /// Returns the first collision of the ego or, if there is none, the first collision of any
+    /// vehicles.
     pub(in crate::run) fn worst_collision(&self) -> Option<&Collision> {
         let ego = self.actors[self.ego].name.as_str();
         let collisions = self.collisions();

@@ -95,8 +95,8 @@ impl Film {
         spans
     }
 
-    /// Returns the vehicle for which the system engaged, in words: its letter or its name. `None` if it
-    /// never engaged, or states no track.
+    /// Returns the vehicle for which the system engaged, in words: its letter or its name. `None`
+    /// if it never engaged, or states no track.
     pub(in crate::run) fn engaged_for(&self) -> Option<&str> {
         let engaged_at = Time::from_s(self.outcome.as_ref()?.mis.as_ref().ok()?.engaged_at_s.ok()?);
         let frame = self.frame_at(engaged_at)?;
@@ -105,8 +105,8 @@ impl Film {
         Some(seen.actor.map_or(NO_VEHICLE, |actor| self.vehicle_letter(actor)))
     }
 
-    /// Returns a sentence on when the ego first saw the relevant vehicle behind it, with the weather if
-    /// that is not clear.
+    /// Returns a sentence on when the ego first saw the relevant vehicle behind it, with the
+    /// weather if that is not clear.
     pub(in crate::run) fn sight(&self) -> Option<String> {
         let spans = self.known_spans();
         if spans.is_empty() {

@@ -17,8 +17,8 @@ impl Film {
     /// 2. in a recorded encounter: the time at which the rear vehicle crosses the lane marking
     /// 3. in a recorded lane change: the time of a critical metric, else the time at which another
     ///    vehicle is closest to the ego
-    /// 4. in a run: the time of the smallest time headway of the vehicle behind, else of the ego to the
-    ///    vehicle ahead
+    /// 4. in a run: the time of the smallest time headway of the vehicle behind, else of the ego to
+    ///    the vehicle ahead
     /// 5. the end
     pub fn critical_moment(&self) -> Time {
         if let Some(collision) = self.worst_collision() {
@@ -47,8 +47,8 @@ impl Film {
     }
 
     /// Returns the moment at which a recording of these films opens, the same in all of them: the
-    /// collision of the last film that has one, else the critical moment of the last film. A film that
-    /// ends a little earlier could only show its last frame, so all show that moment then.
+    /// collision of the last film that has one, else the critical moment of the last film. A film
+    /// that ends a little earlier could only show its last frame, so all show that moment then.
     pub(in crate::run) fn shown_moment(films: &[Self]) -> Time {
         let collided = films.iter().rev().find(|film| film.worst_collision().is_some());
         let shown = collided.or(films.last()).map_or(Time::ZERO, Self::critical_frame_time);

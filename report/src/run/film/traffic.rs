@@ -114,9 +114,9 @@ pub fn film_lane_change(
 }
 
 impl Film {
-    /// Gives the vehicles of a recorded lane change the parts of an encounter, each with its track, for
-    /// a picture in the colours of an encounter. The picture still moves with the vehicle that changes
-    /// lanes.
+    /// Gives the vehicles of a recorded lane change the parts of an encounter, each with its track,
+    /// for a picture in the colours of an encounter. The picture still moves with the vehicle that
+    /// changes lanes.
     #[must_use]
     pub fn with_parts_of_tracks(mut self, parts: &[(Part, u64)]) -> Self {
         for (index, actor) in self.actors.iter_mut().enumerate() {

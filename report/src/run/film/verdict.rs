@@ -71,8 +71,8 @@ impl Film {
         Some(format!("{collision}; smallest headway: {}", headways(outcome)))
     }
 
-    /// Returns the smallest headways, those of the baseline of a pair, and since when the ego saw the
-    /// vehicle behind.
+    /// Returns the smallest headways, those of the baseline of a pair, and since when the ego saw
+    /// the vehicle behind.
     pub(in crate::run) fn headways_and_sight(&self, baseline: Option<&Self>) -> Option<String> {
         let sight = self.sight().map_or(String::new(), |sight| format!(" {sight}"));
         let of_baseline = |film: &Self| Some(format!("; {}: {}", film.arm_label(), headways(film.outcome.as_ref()?)));

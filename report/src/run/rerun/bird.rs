@@ -93,7 +93,8 @@ impl<'a> Canvas<'a> {
             canvases.push(Self { film, top_m, has_axis, ends_early, px_per_m: [1.0; 2] });
             top_m += ABOVE_M + BELOW_M - film.road.right_edge_m() * STRETCH;
         }
-        // The viewer fits the drawing into the view: wide roads make it smaller, and its labels not.
+        // The viewer fits the drawing into the view: wide roads make it smaller, and its labels
+        // not.
         let heights_px = VIEW_HEIGHTS_PX[usize::from(films.len() > 1)];
         let px_per_m = heights_px
             .map(|height_px| (VIEW_WIDTH_PX / (X_RANGE_M[1] - X_RANGE_M[0])).min(height_px / (top_m + AXIS_M)));
@@ -108,8 +109,8 @@ impl<'a> Canvas<'a> {
         (LETTER_PX * letters as f64 + BETWEEN_LABELS_PX) / self.px_per_m[0]
     }
 
-    /// Returns the left and the right end of the room for labels, relative to the ego (m). It is wider
-    /// than the road that is meant to be shown if the height of the view limits the drawing.
+    /// Returns the left and the right end of the room for labels, relative to the ego (m). It is
+    /// wider than the road that is meant to be shown if the height of the view limits the drawing.
     fn labelled_m(&self) -> [f64; 2] {
         let half_m = 0.5 * (X_RANGE_M[1] - X_RANGE_M[0]).max(LABELLED_SHARE * VIEW_WIDTH_PX / self.px_per_m[1]);
         [-half_m, half_m].map(|side_m| 0.5 * (X_RANGE_M[0] + X_RANGE_M[1]) + side_m)
@@ -345,8 +346,8 @@ fn write_gaps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Resul
 /// An outline: its corners in the picture, and its colour.
 type Outline = (Vec<[f32; 2]>, Rgba);
 
-/// Writes the outlines of the confirmed rear tracks that are probably vehicles, and of all false tracks,
-/// which have a colour of their own.
+/// Writes the outlines of the confirmed rear tracks that are probably vehicles, and of all false
+/// tracks, which have a colour of their own.
 fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
     let film = canvas.film;
     let outlines = |frame: &Frame| -> Vec<Outline> {

@@ -114,8 +114,8 @@ fn scenes_share(films: &[FilmContents], has_camera: bool) -> f32 {
     }
 }
 
-/// Height of the window below its bars, of a line of the verdict, and of what surrounds the lines, in a
-/// window of 1280 x 720 px (px).
+/// Height of the window below its bars, of a line of the verdict, and of what surrounds the lines,
+/// in a window of 1280 x 720 px (px).
 const WINDOW_PX: f32 = 662.0;
 const LINE_PX: f32 = 15.0;
 const AROUND_LINES_PX: f32 = 52.0;
@@ -124,8 +124,8 @@ const LINE_LETTERS: usize = 110;
 /// Largest part of the column that the verdict takes.
 const MOST_OF_COLUMN: f32 = 0.4;
 
-/// Returns the room for the verdict, if the other views of the column have the room `rest`: as much as
-/// its lines take in a window of 1280 x 720 px.
+/// Returns the room for the verdict, if the other views of the column have the room `rest`: as much
+/// as its lines take in a window of 1280 x 720 px.
 fn verdict_share(told: &str, rest: f32) -> f32 {
     let letters = |line: &str| line.replace("**", "").chars().count();
     let lines: usize = told.trim().lines().map(|line| letters(line).div_ceil(LINE_LETTERS).max(1)).sum();
@@ -156,7 +156,8 @@ fn scenes(films: &[FilmContents]) -> Option<Node> {
     }
 }
 
-/// Returns the view of the pictures of a rear camera, with the strip above them that has the labels.
+/// Returns the view of the pictures of a rear camera, with the strip above them that has the
+/// labels.
 fn camera(title: String, film: &FilmContents) -> Option<Node> {
     let [width_px, height_px] = film.camera_px?;
     let bounds = Range2D { x_range: [0.0, width_px].into(), y_range: [-super::camera::STRIP_PX, height_px].into() };
@@ -238,11 +239,13 @@ fn is_traffic(films: &[FilmContents]) -> bool {
     films.iter().all(|film| !film.has_states)
 }
 
-/// Room for the half of a label at the end of a time axis, as a share of its length: 15 px of 500 px.
+/// Room for the half of a label at the end of a time axis, as a share of its length: 15 px of 500
+/// px.
 const LABEL_ROOM: f64 = 0.03;
 
-/// Lengths of a run between which the viewer labels no tick but the first, in a window of 1280 px: single seconds have no
-/// room, and the next labelled tick is beyond the end (s). The axis of such a run reaches to that tick.
+/// Lengths of a run between which the viewer labels no tick but the first, in a window of 1280 px:
+/// single seconds have no room, and the next labelled tick is beyond the end (s). The axis of such
+/// a run reaches to that tick.
 const BETWEEN_TICKS_S: [f64; 2] = [6.5, 10.0];
 
 /// Returns a time axis over the longest of the films, with room for the label of its last tick.

@@ -146,8 +146,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Option<[f64; 2]>
     Ok((!images.is_empty()).then(|| part.size_px()))
 }
 
-/// Returns what all boxes in the image have in common. Their own labels would be broken at the width of
-/// a narrow box, and leave the picture below a near vehicle.
+/// Returns what all boxes in the image have in common. Their own labels would be broken at the
+/// width of a narrow box, and leave the picture below a near vehicle.
 fn fixed_marks() -> Boxes2D {
     Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(false)
 }
@@ -157,8 +157,8 @@ fn fixed_labels() -> Points2D {
     Points2D::update_fields().with_colors([palette::LABEL]).with_radii([0.05_f32]).with_show_labels(true)
 }
 
-/// Returns the labels of boxes in the strip above the picture, each over the middle of its box. An empty
-/// label is left out.
+/// Returns the labels of boxes in the strip above the picture, each over the middle of its box. An
+/// empty label is left out.
 fn labels_in_strip(boxes: &[([f32; 2], [f32; 2])], labels: &[String], width_px: f64) -> Points2D {
     let shown = || boxes.iter().zip(labels).filter(|(_, label)| !label.is_empty());
     Points2D::update_fields()
@@ -240,15 +240,16 @@ fn in_picture(shown: &Shown, [left, top, right, bottom]: [f32; 4]) -> ([f32; 2],
 
 /// Entity of the labels of the boxes.
 const LABELS_ENTITY: &str = "world/ego/camera/labels";
-/// Height of the strip above the picture in which the labels of the boxes lie (px of the picture): a
-/// label in a window of 1280 x 720 px. On the strip, which is black, labels are legible.
+/// Height of the strip above the picture in which the labels of the boxes lie (px of the picture):
+/// a label in a window of 1280 x 720 px. On the strip, which is black, labels are legible.
 pub(super) const STRIP_PX: f64 = 16.0;
-/// Width of a letter of a label, and of the box of a label with the room to the next one, there (px of
-/// the picture).
+/// Width of a letter of a label, and of the box of a label with the room to the next one, there (px
+/// of the picture).
 const LETTER_PX: f32 = 3.4;
 const BETWEEN_LABELS_PX: f32 = 10.0;
 
-/// Clears each label that would lie on one of a larger box in the strip above a picture of this width.
+/// Clears each label that would lie on one of a larger box in the strip above a picture of this
+/// width.
 fn clear_covered(boxes: &[([f32; 2], [f32; 2])], labels: &mut [String], width_px: f64) {
     let area = |index: usize| boxes[index].1[0] * boxes[index].1[1];
     let mut order: Vec<usize> = (0..boxes.len().min(labels.len())).collect();

@@ -1,8 +1,8 @@
 //! The collisions of a run as a table, for programs that query the recording. No view shows it.
 //!
-//! Each collision is one row, at the time of the first contact. A component has the name of the same
-//! column in the table of outcomes, without `collision_`. The name ends with the unit, and the type of
-//! the component states the unit too.
+//! Each collision is one row, at the time of the first contact. A component has the name of the
+//! same column in the table of outcomes, without `collision_`. The name ends with the unit, and the
+//! type of the component states the unit too.
 
 use std::sync::Arc;
 

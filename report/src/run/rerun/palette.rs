@@ -30,8 +30,8 @@ const MOMENTS: [Rgba; 7] = [
     [104, 142, 72, 255],
     [130, 130, 140, 255],
 ];
-/// The ground in the view from above, and around the image of a camera. The viewer puts a label on a
-/// box through which the ground shines. In the light theme the box is bright, and only white on a
+/// The ground in the view from above, and around the image of a camera. The viewer puts a label on
+/// a box through which the ground shines. In the light theme the box is bright, and only white on a
 /// black ground has enough contrast.
 pub(super) const GROUND: Rgba = [0, 0, 0, 255];
 /// Fog in the scene.
@@ -245,7 +245,8 @@ mod tests {
         assert_ne!(bar(AFTERWARDS), bar(QUIET));
     }
 
-    /// Fill of the box of a label in the viewer's dark and in its light theme, and its opacity (Rerun 0.36).
+    /// Fill of the box of a label in the viewer's dark and in its light theme, and its opacity
+    /// (Rerun 0.36).
     const LABEL_BOXES: [Rgba; 2] = [[44, 44, 44, 255], [224, 223, 223, 255]];
     const LABEL_BOX_OPACITY: f64 = 0.5;
 

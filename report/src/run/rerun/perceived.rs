@@ -141,7 +141,8 @@ fn edge(field: &FieldOfView, bumper_m: f64) -> Vec<[f32; 3]> {
 
 /// Writes the boxes of the tracks.
 fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordingError> {
-    // The viewer shows the label of the box under the pointer. All labels at once would hide the scene.
+    // The viewer shows the label of the box under the pointer. All labels at once would hide the
+    // scene.
     let fixed = Boxes3D::update_fields()
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.035_f32])

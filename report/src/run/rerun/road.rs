@@ -160,8 +160,8 @@ impl<'a> Ribbons<'a> {
         self.add_along(along_m, |_| across_m);
     }
 
-    /// Adds a ribbon between two positions along the road. `across_m` returns its right and its left
-    /// side at a position along the road.
+    /// Adds a ribbon between two positions along the road. `across_m` returns its right and its
+    /// left side at a position along the road.
     fn add_along(&mut self, along_m: [f64; 2], across_m: impl Fn(f64) -> [f64; 2]) {
         let mut previous = None;
         for s_m in piece_ends(self.road, along_m) {

@@ -26,8 +26,8 @@ pub(super) fn verdict(films: &[Film]) -> String {
     strong(&page)
 }
 
-/// Returns a page with all its text in the viewer's strong colour. The usual text of its light theme
-/// has a contrast of 3.97 : 1 only.
+/// Returns a page with all its text in the viewer's strong colour. The usual text of its light
+/// theme has a contrast of 3.97 : 1 only.
 fn strong(page: &str) -> String {
     let line = |line: &str| match line.split_once(' ') {
         _ if line.is_empty() || line.starts_with('#') || line.starts_with("| ---") => line.to_owned(),
@@ -66,7 +66,8 @@ fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
     let [without, with] = [baseline, tested].map(Film::sentence);
     let happened = |told: &Option<CausalSentence<'_>>| told.as_ref().map_or_else(String::new, CausalSentence::happened);
     let is_same = happened(&without) == happened(&with);
-    // Where no MIS is judged, the emergency brake is: the sentence about the arm under test ends with it.
+    // Where no MIS is judged, the emergency brake is: the sentence about the arm under test ends
+    // with it.
     let has_no_mis = tested.outcome.as_ref().is_some_and(|outcome| outcome.mis.is_err());
     let braked = without.as_ref().filter(|_| has_no_mis).and_then(CausalSentence::emergency_braking);
     let braked = braked.map_or_else(String::new, |braked| format!("; {braked}"));

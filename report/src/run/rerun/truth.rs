@@ -5,8 +5,8 @@
 //! confirmed rear track lies within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts
 //! as missed, even if another vehicle hides it.
 //!
-//! A false track is a confirmed track to which no vehicle belongs. For the front sensor and the side
-//! sensors, a vehicle beside the ego has no near face, so its box decides.
+//! A false track is a confirmed track to which no vehicle belongs. For the front sensor and the
+//! side sensors, a vehicle beside the ego has no near face, so its box decides.
 
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus, maths};
@@ -124,8 +124,8 @@ fn compare(film: &Film, frame: &Frame) -> FrameComparison {
     comparison
 }
 
-/// Returns true if the front sensor or a side sensor reports a vehicle where none is. After a collision
-/// the perception of the ego rests, and its tracks say nothing.
+/// Returns true if the front sensor or a side sensor reports a vehicle where none is. After a
+/// collision the perception of the ego rests, and its tracks say nothing.
 pub(super) fn is_false_track_of_other_sensors(film: &Film, frame: &Frame, track: &Track) -> bool {
     let is_reported = track.source != Source::Rear && track.status == TrackStatus::Confirmed;
     let has_collided = film.worst_collision().is_some_and(|collision| frame.time >= collision.time);
@@ -144,7 +144,8 @@ pub(super) fn belongs_to_a_vehicle(film: &Film, frame: &Frame, track: &Track) ->
     (0..film.actors.len()).any(|actor| actor != film.ego && is_there(actor))
 }
 
-/// Returns true if the centre of a track is in the box of a vehicle (length and width in m), or close to it.
+/// Returns true if the centre of a track is in the box of a vehicle (length and width in m), or
+/// close to it.
 fn is_near_box([x_m, y_m, yaw_rad]: [f64; 3], size_m: [f64; 2], track: &Track) -> bool {
     let (dx_m, dy_m) = (track.x_m() - x_m, track.y_m() - y_m);
     let (sin, cos) = maths::sin_cos(yaw_rad);

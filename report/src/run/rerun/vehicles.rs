@@ -1,10 +1,10 @@
 //! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around
 //! the ego.
 //!
-//! Names, headways and texts of collisions are written, but hidden until the user switches them on. On
-//! the ground and the sky of the scene the viewer's labels are not legible in its light theme, and in a
-//! small scene they lie on each other. The title of the view from above explains the colours, and that
-//! view has all names.
+//! Names, headways and texts of collisions are written, but hidden until the user switches them on.
+//! On the ground and the sky of the scene the viewer's labels are not legible in its light theme,
+//! and in a small scene they lie on each other. The title of the view from above explains the
+//! colours, and that view has all names.
 
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, PlanePose, Road, Time, VehicleClass, VehicleState, maths};

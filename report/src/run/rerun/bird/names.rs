@@ -1,5 +1,5 @@
-//! The names of the vehicles in the view from above, with their speeds and headways, and of tracks that
-//! belong to no vehicle.
+//! The names of the vehicles in the view from above, with their speeds and headways, and of tracks
+//! that belong to no vehicle.
 
 use closecall_traffic::{Measured, Time, Track};
 use rerun::Points2D;
@@ -59,8 +59,8 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let has_collided = film.worst_collision().is_some_and(|collision| frame.time >= collision.time);
     let mut named: Vec<usize> =
         (0..film.actors.len()).filter(|&actor| film.is_main(actor) && film.is_present(actor, row)).collect();
-    // The ego and the vehicles ahead of it and behind it first, then lead and rear vehicle, then the
-    // nearest others.
+    // The ego and the vehicles ahead of it and behind it first, then lead and rear vehicle, then
+    // the nearest others.
     let rank = |actor: &usize| match film.actors[*actor].part {
         Part::Ego => -2.0,
         _ if is_neighbour(frame, *actor) => -1.0,
@@ -100,8 +100,8 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     placed
 }
 
-/// Returns whether a vehicle is directly ahead of the ego or behind it. Such a vehicle has its name at the end of the
-/// labelled stretch if it is beyond it.
+/// Returns whether a vehicle is directly ahead of the ego or behind it. Such a vehicle has its name
+/// at the end of the labelled stretch if it is beyond it.
 fn is_neighbour(frame: &Frame, actor: usize) -> bool {
     frame.lead() == Some(actor) || frame.follower() == Some(actor)
 }

@@ -58,7 +58,8 @@ fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> 
     whats.iter().map(|(time, archetype)| (*time, archetype as _)).collect()
 }
 
-/// Returns the boxes of the instances with class and score, cut to the shown picture, and their labels.
+/// Returns the boxes of the instances with class and score, cut to the shown picture, and their
+/// labels.
 fn boxes(part: &Shown, instances: &[Instance]) -> (Boxes2D, Points2D) {
     let ends = |instance: &Instance| in_picture(part, instance.box_px.map(|side| side as f32));
     let is_shown = |instance: &&Instance| ends(instance).1.iter().all(|side| *side > 0.0);

@@ -39,7 +39,8 @@ const PADDING_LETTERS: f64 = 1.5;
 #[derive(Clone, Copy)]
 struct Word<'a> {
     text: &'a str,
-    /// The texts of a bar that is too short for the whole text, each for a bar too short for the one before.
+    /// The texts of a bar that is too short for the whole text, each for a bar too short for the
+    /// one before.
     shorts: [&'a str; 3],
     colour: Rgba,
 }
@@ -49,7 +50,8 @@ impl<'a> Word<'a> {
         Self { text, shorts: [short; 3], colour }
     }
 
-    /// Returns the state with a text for a bar that has no room for the whole text, and room for more than the short one.
+    /// Returns the state with a text for a bar that has no room for the whole text, and room for
+    /// more than the short one.
     const fn with_longer(self, longer: &'a str) -> Self {
         Self { shorts: [longer, self.shorts[1], self.shorts[2]], ..self }
     }
@@ -122,8 +124,9 @@ const HEALTH_ROWS: [HealthRow; 5] = [
     // The ego does not know the health of its odometry and map.
     HealthRow { row: "odometry_and_map", health: |_| None, alarms: |_| Alarms::NONE, groups: &[SensorGroup::Odometry] },
 ];
-/// Numbers of the rows of sensors that have a fault at any time, and of all others. A fault is often the cause of what
-/// follows, so its row lies beside the row of the reasons, where every window shows it.
+/// Numbers of the rows of sensors that have a fault at any time, and of all others. A fault is
+/// often the cause of what follows, so its row lies beside the row of the reasons, where every
+/// window shows it.
 const FAULTY_ROW: u8 = 2;
 const HEALTHY_ROW: u8 = 7;
 
@@ -244,8 +247,8 @@ fn shortest_health(text: &str) -> &'static str {
 }
 
 /// Returns the name of an arm as the last part of the path of a row. The viewer shows the path, and
-/// writes a backslash before every other character. A plus becomes a word, as `acc+aeb` and `acc-aeb`
-/// can be the two arms of a pair.
+/// writes a backslash before every other character. A plus becomes a word, as `acc+aeb` and
+/// `acc-aeb` can be the two arms of a pair.
 fn row_name(arm: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || matches!(letter, '-' | '.' | '_');
     arm.replace('+', "_with_").chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect()
@@ -303,8 +306,8 @@ impl Plots<'_> {
         self.band("2_reason", &words, &states)
     }
 
-    /// Writes a band that shows from when on vehicles have collided, and which. The bars of collisions
-    /// that follow each other are short, so the bar before the first one names them all.
+    /// Writes a band that shows from when on vehicles have collided, and which. The bars of
+    /// collisions that follow each other are short, so the bar before the first one names them all.
     fn collisions(&self) -> Result<(), RecordingError> {
         let collisions = self.film.collisions();
         let Some(sentence) = self.film.sentence().filter(|_| !collisions.is_empty()) else { return Ok(()) };
@@ -330,9 +333,9 @@ impl Plots<'_> {
         self.band("4_collisions", &words, &states.chain([none]).collect::<Vec<_>>())
     }
 
-    /// Writes a band for each group of sensors that exists, and for odometry and map if they have a fault: its health as
-    /// the ego knows it, with the reasons, and injected faults that the ego has not noticed. The arms of a pair have the
-    /// same sensors, so the baseline writes none.
+    /// Writes a band for each group of sensors that exists, and for odometry and map if they have a
+    /// fault: its health as the ego knows it, with the reasons, and injected faults that the ego
+    /// has not noticed. The arms of a pair have the same sensors, so the baseline writes none.
     fn health(&self) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
@@ -430,8 +433,8 @@ impl Plots<'_> {
     /// Writes a band with one state per frame, and its end after the last frame. A bar shows as
     /// much of the state's name as fits.
     ///
-    /// The viewer fits its time axis to the rows that it has loaded when it draws first, so each row
-    /// has an empty state at the end of the recording.
+    /// The viewer fits its time axis to the rows that it has loaded when it draws first, so each
+    /// row has an empty state at the end of the recording.
     fn band(&self, row: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
         let entity = format!("{ENTITY}/{row}/{}", row_name(self.film.arm_label()));
         let rows = changes(words);
