@@ -7,8 +7,8 @@ use super::inert_fault::refuse_absent;
 use super::{ScenarioError, ScenarioFile};
 
 impl ScenarioFile {
-    /// Refuses a mode of the sensors, given instead of the file's, in which a fault or a perception program of the file could not act: the
-    /// runs would pass for runs with it.
+    /// Refuses a mode of the sensors, given instead of the file's, in which a fault or a perception
+    /// program of the file could not act: the runs would pass for runs with it.
     ///
     /// # Errors
     /// [`ScenarioError::Value`] with the fault or the program.

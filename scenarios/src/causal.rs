@@ -59,12 +59,14 @@ impl VehicleLetters {
         reached.vehicle.as_ref().map_or(reached.moment.unnamed_vehicle(), |vehicle| self.of_other(vehicle))
     }
 
-    /// Returns what happens at a moment, with the letter or the name of its vehicle: *R comes near*.
+    /// Returns what happens at a moment, with the letter or the name of its vehicle: *R comes
+    /// near*.
     pub fn moment_text(&self, reached: &ReachedMoment) -> String {
         reached.moment.text(self.of_moment(reached))
     }
 
-    /// Returns the letter of a moment in brackets, if it has one, and what happens: *(b) R comes near*.
+    /// Returns the letter of a moment in brackets, if it has one, and what happens: *(b) R comes
+    /// near*.
     pub fn moment_label(&self, reached: &ReachedMoment) -> String {
         let text = self.moment_text(reached);
         match reached.moment.letter() {
@@ -83,8 +85,8 @@ pub struct CausalSentence<'a> {
     pub letters: &'a VehicleLetters,
     /// The faults that were injected.
     pub faults: &'a [StatedFault],
-    /// The vehicle for which the MIS engaged, in words, if that is known: its letter or name, or that it
-    /// does not exist.
+    /// The vehicle for which the MIS engaged, in words, if that is known: its letter or name, or
+    /// that it does not exist.
     pub engaged_for: Option<&'a str>,
 }
 
@@ -156,8 +158,8 @@ impl CausalSentence<'_> {
         Some(format!("{did}{gone}"))
     }
 
-    /// Returns whether and when an ego without an MIS braked in an emergency. `None` if it has an MIS, or the outcome does
-    /// not say it.
+    /// Returns whether and when an ego without an MIS braked in an emergency. `None` if it has an
+    /// MIS, or the outcome does not say it.
     pub fn emergency_braking(&self) -> Option<String> {
         let ahead = self.outcome.ahead.filter(|_| self.outcome.mis.is_err())?;
         Some(match ahead.emergency_braking_at_s {

@@ -308,8 +308,8 @@ impl ActorConfig {
     }
 }
 
-/// Rejects a lateral path that needs more lateral acceleration at the initial speed than drivers use
-/// on this road.
+/// Rejects a lateral path that needs more lateral acceleration at the initial speed than drivers
+/// use on this road.
 fn check_path_grip(path: Option<&LateralPath>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
     let bend_per_m = path.map_or(0.0, LateralPath::largest_second_derivative_per_m);
     let (largest_mps2, grip_mps2) = (speed_mps * speed_mps * bend_per_m, lateral_grip_mps2(friction));
@@ -472,8 +472,8 @@ mod tests {
 
     const RAMP: &str = "acceleration-lane = { from-m = 600.0, length-m = 250.0, taper-m = 60.0 }";
 
-    /// The ego at 30 m/s in this lane, and a vehicle. The road has three lanes, and the rightmost one
-    /// is an acceleration lane.
+    /// The ego at 30 m/s in this lane, and a vehicle. The road has three lanes, and the rightmost
+    /// one is an acceleration lane.
     fn scenario(ego_lane: u8, start: &str, driver: &str, more: &str) -> Result<Scenario, String> {
         let text = format!(
             "schema-version = 1\nname = 'ramp'\nduration-s = 5.0\nroad = {{ lanes = 3, {RAMP} }}\n{more}\n\

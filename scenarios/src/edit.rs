@@ -53,8 +53,8 @@ pub enum SettingError {
         /// The keys that exist there.
         names: String,
     },
-    /// Two settings name the same element of a list, by its id and by its index, and contradict each
-    /// other.
+    /// Two settings name the same element of a list, by its id and by its index, and contradict
+    /// each other.
     #[error("`{first}` and `{second}` contradict each other: give one of them")]
     Contradiction {
         /// The earlier setting.
@@ -89,8 +89,8 @@ impl FromStr for Setting {
 }
 
 impl Setting {
-    /// Returns the first two settings that contradict each other: the later one [undoes](Self::undoes)
-    /// the earlier one.
+    /// Returns the first two settings that contradict each other: the later one
+    /// [undoes](Self::undoes) the earlier one.
     pub fn contradiction(settings: &[Self]) -> Option<[&Self; 2]> {
         settings.iter().enumerate().find_map(|(index, later)| {
             let earlier = settings[..index].iter().find(|earlier| later.undoes(earlier))?;
@@ -98,9 +98,9 @@ impl Setting {
         })
     }
 
-    /// Checks that no two settings contradict each other in this document alone, in which an id and an
-    /// index name the same element of a list (`actor.rear.…`, `actor.2.…`). Settings that contradict
-    /// each other in any document are the caller's: see [`Self::contradiction`].
+    /// Checks that no two settings contradict each other in this document alone, in which an id and
+    /// an index name the same element of a list (`actor.rear.…`, `actor.2.…`). Settings that
+    /// contradict each other in any document are the caller's: see [`Self::contradiction`].
     ///
     /// # Errors
     /// [`SettingError::Contradiction`] with the first two settings.
@@ -138,9 +138,10 @@ impl Setting {
     }
 
     /// Returns true if nothing is left of an `earlier` setting after this one: it has the same key
-    /// and another value, it replaces the table in which the earlier key is, or it gives a parameter
-    /// that the earlier one fixed a distribution or another value. A part of a table that an earlier
-    /// setting gave, and a value of a parameter whose distribution it gave, are no contradiction.
+    /// and another value, it replaces the table in which the earlier key is, or it gives a
+    /// parameter that the earlier one fixed a distribution or another value. A part of a table that
+    /// an earlier setting gave, and a value of a parameter whose distribution it gave, are no
+    /// contradiction.
     pub fn undoes(&self, earlier: &Self) -> bool {
         if self.key == earlier.key {
             return !is_equal(&self.value(), &earlier.value());

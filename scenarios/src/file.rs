@@ -272,14 +272,15 @@ impl ScenarioFile {
         Ok(Self { trajectory_files, settings, unused, program_folder, ..Self::parse(&self.path, text, &[])? })
     }
 
-    /// Returns the same file, whose perception program runs in this folder. If the name of the folder is not UTF-8, the program
-    /// runs in the folder of this process.
+    /// Returns the same file, whose perception program runs in this folder. If the name of the
+    /// folder is not UTF-8, the program runs in the folder of this process.
     #[must_use]
     pub fn with_program_in(self, folder: Option<&Path>) -> Self {
         Self { program_folder: folder.and_then(Path::to_str).map(str::to_owned), ..self }
     }
 
-    /// Returns the folder in which the perception program runs; `None` for the folder of this program.
+    /// Returns the folder in which the perception program runs; `None` for the folder of this
+    /// program.
     pub fn program_folder(&self) -> Option<&str> {
         self.program_folder.as_deref()
     }
@@ -316,8 +317,8 @@ impl ScenarioFile {
         &self.settings
     }
 
-    /// Returns the setting that is undone if `key` is given values; `None` if there is none, or `key`
-    /// is no path of keys.
+    /// Returns the setting that is undone if `key` is given values; `None` if there is none, or
+    /// `key` is no path of keys.
     pub fn undone_by(&self, key: &str) -> Option<&Setting> {
         // Of two values, one differs from the value of a setting with the same key.
         let values = ["0", "1"].map(|value| format!("{key}={value}").parse::<Setting>().ok());
@@ -365,8 +366,9 @@ impl ScenarioFile {
     /// one, if a setting has replaced its only use.
     ///
     /// # Errors
-    /// [`ScenarioError::UnusedParameter`] for the first such parameter. [`ScenarioError::Value`] for
-    /// a value that names no parameter: its name is misspelt, and the parameter is not to blame.
+    /// [`ScenarioError::UnusedParameter`] for the first such parameter. [`ScenarioError::Value`]
+    /// for a value that names no parameter: its name is misspelt, and the parameter is not to
+    /// blame.
     pub fn refuse_unused(self) -> Result<Self, ScenarioError> {
         if self.unused.is_some() && self.names_a_missing_parameter() {
             self.concrete(&self.space.nominal())?;

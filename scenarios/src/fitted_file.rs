@@ -4,11 +4,11 @@
 //! A parameter takes the distribution of the entry that was fitted to the same values: to the same
 //! quantity in the same range. Without one, it takes the entry of its name. A log-normal
 //! distribution that the scenario cuts takes the log-normal form of the file, and keeps its cut.
-//! Traffic shows values that a scenario cannot use, such as a closing speed of a millimetre per second
-//! for a vehicle that is to arrive. They are cut to the nearest value that it can use, with a note that
-//! states their share. A scenario that cannot use more than a tenth of the values is refused.
-//! The replacement is a [`Setting`], so that manifests, recordings and JSON state it, with the hash
-//! of the file.
+//! Traffic shows values that a scenario cannot use, such as a closing speed of a millimetre per
+//! second for a vehicle that is to arrive. They are cut to the nearest value that it can use, with
+//! a note that states their share. A scenario that cannot use more than a tenth of the values is
+//! refused. The replacement is a [`Setting`], so that manifests, recordings and JSON state it, with
+//! the hash of the file.
 
 use std::path::{Path, PathBuf};
 
@@ -18,8 +18,8 @@ use closecall_traffic::{ParameterName, Value};
 use super::parameters::{ParameterConfig, ParametersConfig};
 use super::{ScenarioError, ScenarioFile, Setting};
 
-/// Largest share of the values of a distribution that is cut (-): beyond it, the scenario asks about
-/// something else than the data. An assumption; 0.05 to 0.2 are plausible.
+/// Largest share of the values of a distribution that is cut (-): beyond it, the scenario asks
+/// about something else than the data. An assumption; 0.05 to 0.2 are plausible.
 const MOST_CUT: f64 = 0.1;
 /// Number of halvings by which the end of the usable values is searched: numerical.
 const HALVINGS: u32 = 50;
@@ -86,8 +86,8 @@ impl FittedFile {
     ///
     /// # Errors
     /// [`ScenarioError`] if an entry of the file is neither a parameter of the scenario nor a
-    /// quantity of `traffic fit`, if no parameter takes a distribution, or if the scenario cannot use
-    /// most of the values of one.
+    /// quantity of `traffic fit`, if no parameter takes a distribution, or if the scenario cannot
+    /// use most of the values of one.
     pub fn settings(&self, scenario: &ScenarioFile) -> Result<(Vec<Setting>, Vec<String>), ScenarioError> {
         let parameters = &scenario.config().parameters.0;
         let allowed = || parameters.keys().map(ToString::to_string).collect::<Vec<_>>().join(", ");
@@ -201,8 +201,8 @@ impl FittedFile {
     }
 }
 
-/// Returns the value nearest to `bound` that a scenario can use, in the direction of a value that it can
-/// use. `is_usable` is asked for single values.
+/// Returns the value nearest to `bound` that a scenario can use, in the direction of a value that
+/// it can use. `is_usable` is asked for single values.
 fn usable_end(usable: f64, bound: f64, is_usable: impl Fn(f64) -> bool) -> f64 {
     if is_usable(bound) {
         return bound;

@@ -9,7 +9,8 @@
 //! The parameter values of one sample turn it into a *concrete* scenario, [`Scenario`], which is
 //! valid by construction.
 //!
-//! * [`parameters`], [`sampling`]: the distributions of the parameters, and the designs that draw from them
+//! * [`parameters`], [`sampling`]: the distributions of the parameters, and the designs that draw
+//!   from them
 //! * [`library`], [`member`]: the scenarios and the drivers that come with Closecall
 //! * [`outcome`], [`harm`], [`causal`]: what a run leaves behind
 //! * [`criteria`]: what a file asks of the outcomes

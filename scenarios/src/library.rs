@@ -44,8 +44,8 @@ const LIBRARY: [(&str, &str); 17] = embedded![
 const TRAFFIC: [(&str, &str); 4] =
     embedded!["traffic": "busy-overtake", "busy-overtake-without-brake", "dense-traffic", "trucks-alongside"];
 
-/// The scenarios of the folder `as-recorded`: the headline scenario with the full distributions of the
-/// recordings.
+/// The scenarios of the folder `as-recorded`: the headline scenario with the full distributions of
+/// the recordings.
 const AS_RECORDED: [(&str, &str); 1] = embedded!["as-recorded": "low-thw-overtake-as-recorded"];
 
 /// The scenarios of the folder `aeb`, which judge emergency braking.
@@ -60,8 +60,8 @@ const ANCHOR: [(&str, &str); 1] = embedded!["anchor": "anchor-lead-brakes"];
 /// The scenarios of the folder `ramp`: a vehicle merges from a ramp.
 const RAMP: [(&str, &str); 2] = embedded!["ramp": "ramp-merges", "ramp-merges-without-merge"];
 
-/// The scenarios of the folder `faults`: a sensor has a fault. Each file names a base and states only
-/// the differences from it.
+/// The scenarios of the folder `faults`: a sensor has a fault. Each file names a base and states
+/// only the differences from it.
 const FAULTS: [(&str, &str); 82] = embedded![
     "faults":
     "camera-dead",
@@ -253,8 +253,8 @@ fn in_folder(folder: &str) -> &'static [(&'static str, &'static str)] {
     }
 }
 
-/// Returns the name of the scenario that a word names. The word is a name, or a folder and a name such
-/// as `traffic/busy-overtake`.
+/// Returns the name of the scenario that a word names. The word is a name, or a folder and a name
+/// such as `traffic/busy-overtake`.
 pub fn named(word: &str) -> Option<&'static str> {
     match word.split_once('/') {
         Some((folder, name)) => in_folder(folder).iter().map(|(scenario, _)| *scenario).find(|other| *other == name),

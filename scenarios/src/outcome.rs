@@ -150,7 +150,8 @@ impl Moment {
     }
 
     /// Returns a short phrase that says what happens. `vehicle` is the letter or the name of the
-    /// vehicle besides the ego: the vehicle behind or, for [`Self::FrontBrakes`], the vehicle ahead.
+    /// vehicle besides the ego: the vehicle behind or, for [`Self::FrontBrakes`], the vehicle
+    /// ahead.
     pub fn text(self, vehicle: &str) -> String {
         match self {
             Self::Hazard => format!("E brakes hard in front of {vehicle}"),
@@ -279,8 +280,9 @@ pub fn longest_reason(spans: &[ReasonSpan], [from_s, until_s]: [f64; 2]) -> Opti
         .or_else(|| before().next_back().map(|span| span.reason))
 }
 
-/// Time after which an engagement is late, and its delay has a reason that is told (s). It is an assumption that a
-/// reader asks for the reason of a delay that a driver would notice: 0.5 to 2 s are plausible.
+/// Time after which an engagement is late, and its delay has a reason that is told (s). It is an
+/// assumption that a reader asks for the reason of a delay that a driver would notice: 0.5 to 2 s
+/// are plausible.
 const LATE_S: f64 = 1.0;
 
 /// The reason of a system that sees no vehicle behind where there is one.
@@ -320,8 +322,8 @@ pub struct MisSummary {
 }
 
 impl MisSummary {
-    /// Returns the longest time without a break over which a reason held in an interval (s). `None` if it held for no
-    /// time.
+    /// Returns the longest time without a break over which a reason held in an interval (s). `None`
+    /// if it held for no time.
     fn held_s(&self, reason: Reason, [from_s, until_s]: [f64; 2]) -> Option<[f64; 2]> {
         let spans = self.reasons.iter().filter(|span| span.reason == reason);
         let held = spans.map(|span| [span.from_s.max(from_s), span.until_s.min(until_s)]);
@@ -329,8 +331,9 @@ impl MisSummary {
         held.filter(|span| lasted_s(span) > 0.0).max_by(|a, b| lasted_s(a).total_cmp(&lasted_s(b)))
     }
 
-    /// Returns the reason in words, and over which time it held if the system never engaged: *passing lane occupied, 3.6
-    /// to 9.6 s*. A controller that gives no reason of this program has no such time.
+    /// Returns the reason in words, and over which time it held if the system never
+    /// engaged: *passing lane occupied, 3.6 to 9.6 s*. A controller that gives no reason of this
+    /// program has no such time.
     pub fn reason_words(&self) -> String {
         let says_nothing = self.engaged_at_s.is_ok() || self.reason == Reason::External;
         let interval_s = self.decided_s.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
@@ -340,9 +343,9 @@ impl MisSummary {
         }
     }
 
-    /// Returns why the system did not engage sooner, and over which time that held: *vehicle behind not seen in the lane,
-    /// 2.7 to 6.2 s*. `None` if it engaged within one second after the vehicle behind met the conditions on distance and
-    /// speed, or never.
+    /// Returns why the system did not engage sooner, and over which time that held: *vehicle behind
+    /// not seen in the lane, 2.7 to 6.2 s*. `None` if it engaged within one second after the
+    /// vehicle behind met the conditions on distance and speed, or never.
     pub fn delay_words(&self) -> Option<String> {
         let (engaged_at_s, [from_s, until_s]) = (self.engaged_at_s.ok()?, self.decided_s?);
         let waited_s = [from_s, engaged_at_s.min(until_s)];

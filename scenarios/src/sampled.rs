@@ -59,8 +59,8 @@ const EGO_TIME_GAP_S: f64 = 1.8;
 const PATH_STEPS_S: [f64; 5] = [0.5, 0.75, 1.0, 1.5, 2.0];
 /// Shortest distance between two points of a lateral path (m): an assumption, 1 to 5 are plausible.
 const PATH_STEP_M: f64 = 2.0;
-/// Time in which a vehicle steers straight ahead after the end of its record (s): an assumption, 1 to 3
-/// are plausible.
+/// Time in which a vehicle steers straight ahead after the end of its record (s): an assumption, 1
+/// to 3 are plausible.
 const STRAIGHTENING_S: f64 = 2.0;
 /// Distance to the edge of the road that the path of a vehicle's centre keeps (m): numerical.
 const EDGE_M: f64 = 0.01;
@@ -204,7 +204,8 @@ fn at_or_before(track: &Trajectory, time: Time) -> Option<&TrajectoryPoint> {
 }
 
 /// Returns the indices of the vehicles that are simulated beside the one that changes lanes: both
-/// opponents, and the vehicles that are there from the start, not behind, and apart from all others.
+/// opponents, and the vehicles that are there from the start, not behind, and apart from all
+/// others.
 fn simulated_others(encounter: &RecordedEncounter, opp2: Option<usize>) -> Vec<usize> {
     let opp1 = encounter.overtaken_index();
     let is_opponent = |index: &usize| Some(*index) == opp1 || Some(*index) == opp2;
@@ -290,8 +291,9 @@ fn recorded_actor(
     })
 }
 
-/// Returns the recorded lateral path of a vehicle, within the road: the finest one that needs no more
-/// lateral acceleration than drivers use. What it leaves out is noise of the recorded positions.
+/// Returns the recorded lateral path of a vehicle, within the road: the finest one that needs no
+/// more lateral acceleration than drivers use. What it leaves out is noise of the recorded
+/// positions.
 fn lateral_path(encounter: &RecordedEncounter, vehicle: &Trajectory) -> Vec<[f64; 2]> {
     let speed_mps = max_speed_mps([vehicle]);
     let friction = Environment::CLEAR_DAY.friction;

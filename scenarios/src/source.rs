@@ -136,9 +136,9 @@ fn append_below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), ScenarioE
     Ok(())
 }
 
-/// Returns false for a TOML file without any key of a scenario, such as the drivers of an ensemble, a
-/// fleet or a `Cargo.toml`. A file that is empty, or cannot be read as TOML, may be a scenario with a
-/// mistake, and is not passed over.
+/// Returns false for a TOML file without any key of a scenario, such as the drivers of an ensemble,
+/// a fleet or a `Cargo.toml`. A file that is empty, or cannot be read as TOML, may be a scenario
+/// with a mistake, and is not passed over.
 fn may_be_scenario(path: &Path) -> bool {
     let text = read_text(path).ok().filter(|text| !text.trim().is_empty());
     let document = text.and_then(|text| text.parse::<toml::Table>().ok());
@@ -167,8 +167,8 @@ fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError
     }
 }
 
-/// Returns the name and the text of the scenario of the library that an argument names; `None` for the
-/// path of a file.
+/// Returns the name and the text of the scenario of the library that an argument names; `None` for
+/// the path of a file.
 fn of_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, ScenarioError> {
     let word = path.to_str().unwrap_or_default();
     let scenario = library::named(word).and_then(|name| Some((name, library::text(name)?)));

@@ -7,8 +7,8 @@ use closecall_traffic::{Road, Time, VehicleState};
 
 use super::{Actor, Event, Scenario, Trigger};
 
-/// Distance within which the nearest vehicle behind starts that does not approach (m): a choice. Every
-/// rear sensor sees it, and it follows at 2 s at 30 m/s.
+/// Distance within which the nearest vehicle behind starts that does not approach (m): a choice.
+/// Every rear sensor sees it, and it follows at 2 s at 30 m/s.
 const NEAR_M: f64 = 60.0;
 
 impl Scenario {
@@ -52,9 +52,9 @@ impl Scenario {
     }
 
     /// Returns the same scenario in which the vehicles that start behind the ego, in any lane, keep
-    /// their lane and a constant speed, at most the speed of the ego at the start. They start so near
-    /// that the ego can see one. The others have no events: somebody is behind, nobody approaches, and
-    /// nothing happens ahead. Returns `None` if nobody is behind.
+    /// their lane and a constant speed, at most the speed of the ego at the start. They start so
+    /// near that the ego can see one. The others have no events: somebody is behind, nobody
+    /// approaches, and nothing happens ahead. Returns `None` if nobody is behind.
     pub fn with_nobody_approaching(&self) -> Option<Self> {
         let ego = self.actors[self.ego].start;
         let is_behind = |actor: &Actor| actor.start.s_m < ego.s_m;

@@ -65,7 +65,8 @@ pub struct Target {
     pub at_least: u64,
     /// For each bin whether it counts, the bins of the last item next to each other.
     pub counts: Vec<bool>,
-    /// For each bin its probability, if the items are parameters that are not correlated with others.
+    /// For each bin its probability, if the items are parameters that are not correlated with
+    /// others.
     pub weights: Option<Vec<f64>>,
 }
 
@@ -84,7 +85,8 @@ impl CoverageConfig {
     /// Checks the table against the parameters of the scenario.
     ///
     /// # Errors
-    /// [`ConfigError`] for a name that does not exist, edges that do not ascend, and what else does not fit.
+    /// [`ConfigError`] for a name that does not exist, edges that do not ascend, and what else does
+    /// not fit.
     pub(crate) fn check(&self, space: &ParameterSpace) -> Result<CoveragePlan, ConfigError> {
         let mut plan = CoveragePlan::default();
         for (name, config) in &self.item {
@@ -258,8 +260,8 @@ fn cross(name: CoverageName, config: &CrossConfig, items: &[Item]) -> Result<Tar
 }
 
 impl Item {
-    /// Returns the index of the bin of a run; `None` if its value is in no bin, or the run has none.
-    /// `surroundings` returns road and weather of the run.
+    /// Returns the index of the bin of a run; `None` if its value is in no bin, or the run has
+    /// none. `surroundings` returns road and weather of the run.
     pub fn bin(&self, outcome: &Outcome, surroundings: &dyn Fn() -> Option<Surroundings>) -> Option<usize> {
         match &self.source {
             Source::Parameter(name) => self.bin_of_value(&outcome.parameters, name),
@@ -295,8 +297,8 @@ impl Item {
 }
 
 impl Item {
-    /// Returns the part of the parameter's numbers u that each bin has; `None` for what is no parameter, or one that is correlated
-    /// with another.
+    /// Returns the part of the parameter's numbers u that each bin has; `None` for what is no
+    /// parameter, or one that is correlated with another.
     fn parts(&self, space: &ParameterSpace) -> Option<Vec<Part>> {
         let Source::Parameter(name) = &self.source else { return None };
         let parameter = space.iter().position(|(other, _)| other == name)?;

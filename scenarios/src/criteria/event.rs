@@ -62,8 +62,8 @@ impl Event {
         }
     }
 
-    /// Returns true if the event happens in every run or in none, whatever happens there: no value of
-    /// the number lies on both sides of the bound.
+    /// Returns true if the event happens in every run or in none, whatever happens there: no value
+    /// of the number lies on both sides of the bound.
     fn is_constant(&self) -> bool {
         let Some((comparison, bound)) = self.bound else { return false };
         let is_beyond = |least: f64| match comparison {

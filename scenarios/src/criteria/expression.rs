@@ -11,11 +11,13 @@
 //!  operator  = "<=" | ">="
 //! ```
 //!
-//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is at least 1 s.
-//! `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in which the ego collides without the system,
-//! more than half are prevented with 95 % confidence. `lower` and `upper` are the exact one-sided bounds of a share.
-//! `coverage(closing-by-class) >= 0.95` asks that samples hit 95 % of the bins of that item or cross.
-//! `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than 3 m/s² in at most 5 % of the samples.
+//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is
+//! at least 1 s. `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in
+//! which the ego collides without the system, more than half are prevented with 95 % confidence.
+//! `lower` and `upper` are the exact one-sided bounds of a share.
+//! `coverage(closing-by-class) >= 0.95` asks that samples hit 95 % of the bins of that item or
+//! cross. `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than
+//! 3 m/s² in at most 5 % of the samples.
 
 use std::fmt;
 use std::str::FromStr;
@@ -208,8 +210,8 @@ impl Expression {
         [reports(true), reports(false)]
     }
 
-    /// Returns the first two gates that contradict each other: they bound the same value on the same
-    /// side, with different bounds.
+    /// Returns the first two gates that contradict each other: they bound the same value on the
+    /// same side, with different bounds.
     pub fn contradiction(gates: &[Self]) -> Option<[Self; 2]> {
         gates.iter().enumerate().find_map(|(index, later)| {
             let is_other = |earlier: &&Self| {

@@ -47,8 +47,8 @@ impl Measure {
         (self.value)(outcome)
     }
 
-    /// Returns true if the controller reports the measure of itself. The measure is then not evidence
-    /// about a controller from outside.
+    /// Returns true if the controller reports the measure of itself. The measure is then not
+    /// evidence about a controller from outside.
     pub fn is_reported(&self) -> bool {
         REPORTED.contains(&self.name)
     }
@@ -73,8 +73,8 @@ impl Measure {
 const REPORTED: [&str; 4] = ["engaged", "goal_in_reach", "thw_gain_s", "emergency_braked"];
 
 /// Amount that no measure of a run exceeds, in its unit (s, m, m/s, m/s², m/s³ or deaths): an
-/// assumption; 1e4 to 1e9 are plausible. Only a time to collision may exceed it, if two vehicles have
-/// almost the same speed. The time then says nothing.
+/// assumption; 1e4 to 1e9 are plausible. Only a time to collision may exceed it, if two vehicles
+/// have almost the same speed. The time then says nothing.
 pub(super) const LARGEST: f64 = 1e6;
 
 /// The numbers that are 0 or more by definition.

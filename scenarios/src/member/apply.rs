@@ -40,7 +40,8 @@ struct Place {
 }
 
 impl Member {
-    /// Applies the member to every human driver of `file` that is not prescribed, the ego's driver included, and checks the result.
+    /// Applies the member to every human driver of `file` that is not prescribed, the ego's driver
+    /// included, and checks the result.
     ///
     /// A parameter that only the replaced values use keeps its name and gets the member's
     /// distribution. The other parameters then keep their values in every sampling design. Any

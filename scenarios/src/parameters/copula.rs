@@ -88,8 +88,8 @@ impl Copula {
         }
     }
 
-    /// Makes coupled standard normal numbers of all parameters, which are in the order of the names,
-    /// independent of each other: what [`Self::couple`] does, backwards.
+    /// Makes coupled standard normal numbers of all parameters, which are in the order of the
+    /// names, independent of each other: what [`Self::couple`] does, backwards.
     pub(super) fn uncouple(&self, normals: &mut [f64]) {
         let mut independent: Vec<f64> = Vec::with_capacity(self.rows.len());
         for (place, (index, row)) in self.rows.iter().enumerate() {

@@ -223,10 +223,10 @@ impl Distribution {
         }
     }
 
-    /// Returns how far a value is from the nominal one (standard deviations, with sign): the standard
-    /// normal number with the same cumulative probability. The nominal label is at 0, and any other
-    /// label at the number nearest to 0 that gives it. Returns `None` for a value that the
-    /// distribution never takes, and at a bound, which is infinitely far.
+    /// Returns how far a value is from the nominal one (standard deviations, with sign): the
+    /// standard normal number with the same cumulative probability. The nominal label is at 0, and
+    /// any other label at the number nearest to 0 that gives it. Returns `None` for a value that
+    /// the distribution never takes, and at a bound, which is infinitely far.
     pub fn distance_sd(&self, value: &Value) -> Option<f64> {
         if *value == self.nominal() {
             return Some(0.0);
@@ -242,7 +242,8 @@ impl Distribution {
         (probability > 0.0 && probability < 1.0).then(|| normal.quantile(probability))
     }
 
-    /// Returns the numbers u whose quantile is this label; `None` if it is none of the distribution's.
+    /// Returns the numbers u whose quantile is this label; `None` if it is none of the
+    /// distribution's.
     pub(crate) fn interval_of(&self, label: &str) -> Option<[f64; 2]> {
         let index = self.labels().iter().position(|one| one == label)?;
         match &self.0 {

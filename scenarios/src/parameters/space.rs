@@ -83,8 +83,8 @@ pub enum Variation {
 /// Probability of the median.
 const HALF: f64 = 0.5;
 
-/// Largest distance of a coupled number u from [`HALF`] that is taken for a rounding error (-): more
-/// than a thousand spacings of such numbers, and no sampled number is so near.
+/// Largest distance of a coupled number u from [`HALF`] that is taken for a rounding error (-):
+/// more than a thousand spacings of such numbers, and no sampled number is so near.
 const ROUNDING: f64 = 1e-12;
 
 /// Returns the standard normal probability below `z`, within the domain of a quantile function:
@@ -152,9 +152,10 @@ impl ParameterSpace {
         self.iter().filter(|(_, entry)| entry.distribution.variation() != Variation::None)
     }
 
-    /// Returns the values at a point of the unit cube, which has a coordinate in [0, 1) for each parameter of
-    /// [`Self::varying`]: its quantile there. Rank correlations do not count here: a
-    /// study of sensitivity varies one parameter after the other. The other parameters have their only value. A coordinate that is missing is taken as the median.
+    /// Returns the values at a point of the unit cube, which has a coordinate in [0, 1) for each
+    /// parameter of [`Self::varying`]: its quantile there. Rank correlations do not count here: a
+    /// study of sensitivity varies one parameter after the other. The other parameters have their
+    /// only value. A coordinate that is missing is taken as the median.
     pub fn at(&self, point: &[f64]) -> Parameters {
         let mut coordinates = point.iter();
         self.map(|_, _, distribution| match distribution.variation() {
@@ -221,8 +222,8 @@ impl ParameterSpace {
         })
     }
 
-    /// Returns the distance of a point to the nominal values (standard deviations): its length, with
-    /// the distances of its labels.
+    /// Returns the distance of a point to the nominal values (standard deviations): its length,
+    /// with the distances of its labels.
     pub fn length_sd(&self, point: &NormalPoint) -> f64 {
         let of_label = |(name, label): (&ParameterName, &String)| {
             self.get(name)?.distribution.distance_sd(&Value::Label(label.clone()))

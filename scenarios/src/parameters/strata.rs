@@ -1,7 +1,8 @@
 //! Parts of the unit cube that the sampling design `coverage` visits in turn.
 //!
-//! A bin of a coverage item or cross is a part of the cube: an interval of the number u of each of its parameters. Its weight is its
-//! volume, which is its probability. A bin without a volume cannot be hit.
+//! A bin of a coverage item or cross is a part of the cube: an interval of the number u of each of
+//! its parameters. Its weight is its volume, which is its probability. A bin without a volume
+//! cannot be hit.
 
 /// An interval of the number u of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Random samples that visit the bins of a coverage item or cross in turn.
 //!
-//! Within a bin the numbers u are uniform and independent, so that a sample of the bin is one of the scenario's distribution, given the
-//! bin.
+//! Within a bin the numbers u are uniform and independent, so that a sample of the bin is one of
+//! the scenario's distribution, given the bin.
 
 use closecall_traffic::{ParameterName, Parameters};
 
