@@ -5,7 +5,8 @@
 //!  concrete scenario ─▶ [ world ─▶ sensors ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome
 //! ```
 //!
-//! * [`controller`]: the controllers that can drive the ego vehicle, built in or as a separate process
+//! * [`controller`]: the controllers that can drive the ego vehicle, built in or as a separate
+//!   process
 //! * [`perception`]: a perception of the user's own, as a separate process
 //! * [`run`](mod@run): the closed loop, and the observers of a run
 //! * [`calibration`]: car-following models fitted to recorded pairs

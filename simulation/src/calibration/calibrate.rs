@@ -69,8 +69,8 @@ pub fn calibrate(model: FollowingModel, data: &FollowingData) -> Option<Calibrat
     calibrate_watched(model, data, &|_| ())
 }
 
-/// Works like [`calibrate`]. `on_progress` receives the number of fits that are done, and of all: one of
-/// each pair, and the pooled one, which counts as one of each pair.
+/// Works like [`calibrate`]. `on_progress` receives the number of fits that are done, and of all:
+/// one of each pair, and the pooled one, which counts as one of each pair.
 pub fn calibrate_watched(
     model: FollowingModel,
     data: &FollowingData,

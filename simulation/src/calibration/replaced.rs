@@ -22,13 +22,13 @@ const STEPS_PER_UNIT: f64 = 1_000.0;
 /// Range of the desired speed (m/s): below the slowest one of the general calibration, because a
 /// recording may show nothing but slow traffic.
 const DESIRED_MPS: [f64; 2] = [1.0, 45.0];
-/// The published values of the parameters, in the order of [`FollowingModel::parameters`]. The first
-/// one, the desired speed, has none.
+/// The published values of the parameters, in the order of [`FollowingModel::parameters`]. The
+/// first one, the desired speed, has none.
 const PUBLISHED: [f64; 11] = [0.0, 1.5, 0.9, 4.0, -8.0, -0.35, 0.35, 11.44, 0.25, 3.5, 1.5];
 /// Indices of the desired speed and of cc1.
 const SPEED_AND_HEADWAY: [usize; 2] = [0, 2];
-/// Indices of all parameters but cc0, the gap at standstill, and cc6, which changes cc4 and cc5 with
-/// the gap: a short recording on a motorway shows neither.
+/// Indices of all parameters but cc0, the gap at standstill, and cc6, which changes cc4 and cc5
+/// with the gap: a short recording on a motorway shows neither.
 const ALL: [usize; 9] = [0, 2, 3, 4, 5, 6, 8, 9, 10];
 
 /// How many parameters of a driver are calibrated.
@@ -40,9 +40,9 @@ pub enum Calibrated {
     All,
 }
 
-/// Returns the instants of the vehicle that changes lanes, from the start to `until`, with the vehicle
-/// ahead of it among `others`: indices into the vehicles of the encounter. Returns `None` where nobody
-/// is ahead.
+/// Returns the instants of the vehicle that changes lanes, from the start to `until`, with the
+/// vehicle ahead of it among `others`: indices into the vehicles of the encounter. Returns `None`
+/// where nobody is ahead.
 pub fn ahead_of(encounter: &RecordedEncounter, others: &[usize], until: Time) -> Vec<(Time, Option<FollowingInstant>)> {
     let own = &encounter.rear().trajectory;
     let within = own.points.iter().take_while(|point| point.time <= until);

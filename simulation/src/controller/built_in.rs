@@ -80,7 +80,8 @@ impl BuiltIn {
         }
     }
 
-    /// Returns true if a human drives, so that the controller needs a scenario whose ego has a human driver.
+    /// Returns true if a human drives, so that the controller needs a scenario whose ego has a
+    /// human driver.
     pub const fn needs_human(self) -> bool {
         matches!(self, Self::Stack(functions) if functions.needs_human())
     }

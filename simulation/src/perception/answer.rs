@@ -1,4 +1,5 @@
-//! Parses the answers of a perception process. Each error names the field, what is needed there, and what was found.
+//! Parses the answers of a perception process. Each error names the field, what is needed there,
+//! and what was found.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +11,8 @@ use serde_json::{Map, Value};
 
 use crate::controller::exec::{ExecError, excerpt};
 
-/// Largest number of detections or tracks in an answer. An assumption: a motorway has some tens of vehicles in view.
+/// Largest number of detections or tracks in an answer. An assumption: a motorway has some tens of
+/// vehicles in view.
 pub(super) const MOST_OBJECTS: usize = 256;
 /// Largest coordinate (m), as in the LiDARs' region of interest.
 const POSITION: Range = Range::closed(-500.0, 500.0);
@@ -22,7 +24,8 @@ const LENGTH: Range = Range::closed(0.1, 40.0);
 const WIDTH: Range = Range::closed(0.1, 5.0);
 /// Variances: no perception is exact, and none is of use beyond.
 const VARIANCE: Range = Range::above(0.0, 1e6);
-/// Difference of two elements of a covariance that mirror each other, relative to the largest element, up to which they are equal.
+/// Difference of two elements of a covariance that mirror each other, relative to the largest
+/// element, up to which they are equal.
 const ASYMMETRY: f64 = 1e-9;
 /// Difference of the sum of probabilities from 1 up to which they add up to 1.
 const SUM_TOLERANCE: f64 = 1e-3;
@@ -113,10 +116,12 @@ pub(super) fn stated_error(line: &[u8]) -> Option<String> {
     object(line).ok()?.get(ERROR_KEY)?.as_str().map(str::to_owned)
 }
 
-/// Parses the answer to the question at `time`. `answered` is the number of answers before, including the greeting.
+/// Parses the answer to the question at `time`. `answered` is the number of answers before,
+/// including the greeting.
 ///
 /// # Errors
-/// [`ExecError::OtherStep`] if it is the answer to another question, or [`AnswerError`] with the field that is wrong.
+/// [`ExecError::OtherStep`] if it is the answer to another question, or [`AnswerError`] with the
+/// field that is wrong.
 pub(super) fn parse(
     line: &[u8],
     (kind, time): (Kind, Time),
@@ -238,7 +243,8 @@ impl Object {
         Ok(covariance)
     }
 
-    /// Returns the probabilities of the classes. Those that are absent are 0; without any, nothing is known.
+    /// Returns the probabilities of the classes. Those that are absent are 0; without any, nothing
+    /// is known.
     fn class(&self) -> Result<ClassScores, Wrong> {
         const KEY: &str = "class";
         let classes = match self.object.get(KEY) {
@@ -373,7 +379,8 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, AnswerError> {
     }
 }
 
-/// Returns the first word of a line that is NaN or infinite, behind the key that it belongs to; `None` if there is none.
+/// Returns the first word of a line that is NaN or infinite, behind the key that it belongs to;
+/// `None` if there is none.
 fn not_finite(line: &[u8]) -> Option<(String, String)> {
     let text = std::str::from_utf8(line).ok()?;
     let (mut key, mut word_start, mut in_string) = (String::new(), None, None);

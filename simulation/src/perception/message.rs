@@ -1,4 +1,5 @@
-//! The messages to a perception process: `question.rs` writes them, and the process of a library reads them.
+//! The messages to a perception process: `question.rs` writes them, and the process of a library
+//! reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

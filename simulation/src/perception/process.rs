@@ -1,5 +1,5 @@
-//! A process as the perception of the closed loop: a command, a process of this program that has loaded a library, or a process with an
-//! object of a Python program.
+//! A process as the perception of the closed loop: a command, a process of this program that has
+//! loaded a library, or a process with an object of a Python program.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -58,7 +58,8 @@ impl ProgramError {
     }
 }
 
-/// A process that perceives in one run. It is started at the first question and ended when this value is dropped.
+/// A process that perceives in one run. It is started at the first question and ended when this
+/// value is dropped.
 pub(crate) struct PerceptionProcess {
     program: ProgramSettings,
     started: Option<(Child, Kind)>,
@@ -103,7 +104,8 @@ impl PerceptionProcess {
         }
     }
 
-    /// Returns the failure at the time of a question. A program that was not greeted was asked none.
+    /// Returns the failure at the time of a question. A program that was not greeted was asked
+    /// none.
     fn failure(&self, error: &ProgramError, time: Time) -> SensorError {
         let time = self.started.is_some().then_some(time);
         let reason = error.message(self.program.kind);
@@ -126,8 +128,9 @@ impl PerceptionProgram for PerceptionProcess {
     }
 }
 
-/// Starts a program, greets it as in a run of the scenario, and returns what it states about itself in its first answer, and the files
-/// that it has open: none of a library, whose process is this program. `None` if it cannot be greeted.
+/// Starts a program, greets it as in a run of the scenario, and returns what it states about itself
+/// in its first answer, and the files that it has open: none of a library, whose process is this
+/// program. `None` if it cannot be greeted.
 pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Option<(Identity, Vec<PathBuf>)> {
     let model = scenario.sensors.full_model();
     let size = scenario.actors[scenario.ego].vehicle.dimensions;
@@ -141,11 +144,13 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
     Some((identity, open_files))
 }
 
-/// Tries whether a program can be started, and is killed at once, or whether a library can be loaded by a separate process.
+/// Tries whether a program can be started, and is killed at once, or whether a library can be
+/// loaded by a separate process.
 ///
 /// # Errors
-/// [`NativeError::StartProgram`] if a command cannot be started, or if a library ends or blocks the process that loads it, and
-/// [`NativeError::RefusedProgram`] if a file is no library of a perception.
+/// [`NativeError::StartProgram`] if a command cannot be started, or if a library ends or blocks the
+/// process that loads it, and [`NativeError::RefusedProgram`] if a file is no library of a
+/// perception.
 pub fn try_program(program: &ProgramSettings) -> Result<(), NativeError> {
     let fail = |reason: String| NativeError::StartProgram { program: program.name(), reason };
     let folder = program.folder.map(Path::new);

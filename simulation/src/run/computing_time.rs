@@ -3,9 +3,9 @@
 //! A command is valid from the instant of its input on: the loop waits for it. A controller that
 //! computes for longer than the control period could not do so in a vehicle. Such a run is an
 //! error. Two figures of the run decide, because a machine with other work delays single steps: the
-//! mean, and the share of steps that exceed the period. The mean alone would accept a controller that
-//! computes for 150 ms in every fifth step. While this thread itself waits for a processor, the
-//! machine is late and not the controller: Linux counts that time, and it is taken off.
+//! mean, and the share of steps that exceed the period. The mean alone would accept a controller
+//! that computes for 150 ms in every fifth step. While this thread itself waits for a processor,
+//! the machine is late and not the controller: Linux counts that time, and it is taken off.
 
 use std::time::{Duration, Instant};
 
@@ -16,8 +16,8 @@ use closecall_traffic::{CONTROL_STEP, Time};
 /// to 250 are plausible.
 const LEAST_STEPS: u32 = 125;
 
-/// Number of steps from which on the mean counts at the end of a run (-): one second. An assumption;
-/// 10 to 125 are plausible.
+/// Number of steps from which on the mean counts at the end of a run (-): one second. An
+/// assumption; 10 to 125 are plausible.
 const LEAST_STEPS_OF_A_RUN: u32 = 25;
 
 /// Largest share of steps that may exceed the period (-). An assumption: a vehicle's controller has
@@ -41,8 +41,8 @@ impl ComputingTime {
     /// Calls `step`, and adds the time that it takes.
     ///
     /// # Errors
-    /// The error of `step`, or [`ControllerError::Late`] if the mean computing time, or the time of too
-    /// many steps, exceeds the control period.
+    /// The error of `step`, or [`ControllerError::Late`] if the mean computing time, or the time of
+    /// too many steps, exceeds the control period.
     pub(super) fn of<T>(
         &mut self,
         time: Time,
@@ -90,8 +90,8 @@ impl ComputingTime {
         }
     }
 
-    /// Returns a message if the mean, or the time of too many steps, exceeds `allowed_ms`, and there
-    /// are enough steps.
+    /// Returns a message if the mean, or the time of too many steps, exceeds `allowed_ms`, and
+    /// there are enough steps.
     fn judged(&self, least_steps: u32, allowed_ms: f64) -> Option<String> {
         if self.steps < least_steps {
             return None;

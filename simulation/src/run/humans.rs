@@ -21,7 +21,8 @@ pub(super) struct Human {
     pub(super) desired_speed_noise: Option<DesiredSpeedNoise>,
 }
 
-/// Creates the human drivers of all vehicles: of the ego only if the arm has `settings` in which a human drives.
+/// Creates the human drivers of all vehicles: of the ego only if the arm has `settings` in which a
+/// human drives.
 pub(super) fn human_drivers(scenario: &Scenario, key: RunKey, settings: &EgoSettings) -> Vec<Human> {
     let mut humans = Vec::with_capacity(scenario.actors.len());
     for (actor, setup) in scenario.actors.iter().enumerate() {

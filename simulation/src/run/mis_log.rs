@@ -87,8 +87,8 @@ pub(super) struct MisLog {
     unavailable: Option<Unavailability>,
 }
 
-/// Returns the reason for an engagement. The first command after emergency braking states its end; its
-/// plan has what the reason of the system would say.
+/// Returns the reason for an engagement. The first command after emergency braking states its end;
+/// its plan has what the reason of the system would say.
 fn engagement_reason(command: &EgoCommand) -> Reason {
     match (command.reason, command.plan) {
         (Reason::BrakingDone, Some(plan)) if plan.goal_in_reach => Reason::Engaged,
@@ -149,8 +149,8 @@ impl MisLog {
         }
     }
 
-    /// Returns whether emergency braking goes on so soon after the engagement that the engagement is
-    /// a pause of it.
+    /// Returns whether emergency braking goes on so soon after the engagement that the engagement
+    /// is a pause of it.
     fn is_pause_over(&self, now: &MisObservation<'_>) -> bool {
         let is_pause = |engaged: &Engagement| engaged.is_after_braking && now.time - engaged.at < LEAST_AFTER_BRAKING;
         now.command.state == EgoState::EmergencyBraking && self.engaged.as_ref().is_some_and(is_pause)
@@ -242,9 +242,9 @@ mod tests {
     const THW_S: f64 = 1.0;
     const SPEED_MPS: f64 = 30.0;
 
-    /// Returns the summary of a run whose stack has these states for these numbers of control steps,
-    /// one after the other. The vehicle behind is near from the start until a hazard at the first
-    /// step of emergency braking.
+    /// Returns the summary of a run whose stack has these states for these numbers of control
+    /// steps, one after the other. The vehicle behind is near from the start until a hazard at the
+    /// first step of emergency braking.
     fn summary(states: &[(EgoState, Reason, usize)]) -> MisSummary {
         let mut log = MisLog::new();
         let mut time = Time::ZERO;

@@ -8,9 +8,9 @@
 //!
 //! E is the ego, F the lead vehicle, R the rear vehicle, and d_c the critical distance. The moments
 //! follow from the ground truth, not from the controller, so that runs with and without the system
-//! can be compared. Each is noted once, with its vehicle: if several vehicles come from behind, their
-//! moments may belong to different ones. They may occur in another order: the lead vehicle may brake
-//! early.
+//! can be compared. Each is noted once, with its vehicle: if several vehicles come from behind,
+//! their moments may belong to different ones. They may occur in another order: the lead vehicle
+//! may brake early.
 
 use closecall_traffic::{ActorId, Time};
 

@@ -1,4 +1,5 @@
-//! The log that one simulated vehicle would record of itself, and the ground truth of its lane changes.
+//! The log that one simulated vehicle would record of itself, and the ground truth of its lane
+//! changes.
 //!
 //! The log holds the vehicle's motion at 100 Hz and, on every fourth step, the signals of its bus.
 //! It contains no noise except the rounding of the written numbers. Robustness studies add noise

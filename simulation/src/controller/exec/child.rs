@@ -62,8 +62,8 @@ const CHUNK_BYTES: usize = 4_096;
 /// How closely the memory of a process is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum MemoryLook {
-    /// At the answer to a control step. A peak since the last look is seen at the next one, which comes
-    /// 20 ms later, or at the end of the process, which serves one run.
+    /// At the answer to a control step. A peak since the last look is seen at the next one, which
+    /// comes 20 ms later, or at the end of the process, which serves one run.
     Step,
     /// At the answer of a process that serves several samples: a peak belongs to the last one.
     Peak,
@@ -250,8 +250,8 @@ impl Child {
     }
 
     /// Works like [`Self::finish`], for a process of this program with nothing left to do than to
-    /// unload a library. How that ends the process is no error: the process of a campaign unloads the
-    /// library after all its samples. A bad end is kept under `name`: see
+    /// unload a library. How that ends the process is no error: the process of a campaign unloads
+    /// the library after all its samples. A bad end is kept under `name`: see
     /// [`take_bad_ends`](super::take_bad_ends).
     ///
     /// # Errors
@@ -401,8 +401,8 @@ impl Child {
         }
     }
 
-    /// Returns whether the process, or the process with its descendants, holds or held more memory than
-    /// allowed.
+    /// Returns whether the process, or the process with its descendants, holds or held more memory
+    /// than allowed.
     fn exceeds_memory(&mut self, look: MemoryLook) -> bool {
         let is_due = self.tree_looked.elapsed() >= MEMORY_CHECK_INTERVAL;
         if is_due {

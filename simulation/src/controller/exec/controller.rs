@@ -14,8 +14,8 @@ use super::settings::ExecSettings;
 use super::{Identity, NAME, protocol};
 use crate::run::ControllerFactory;
 
-/// Time limit of the answer to the first message. The process may first have to load an interpreter and its libraries,
-/// perhaps on a busy machine.
+/// Time limit of the answer to the first message. The process may first have to load an interpreter
+/// and its libraries, perhaps on a busy machine.
 pub(crate) const START_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Creates controllers that run as separate processes.

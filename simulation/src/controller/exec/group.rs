@@ -7,10 +7,10 @@
 //!   └─ closecall-PID-NUMBER: one process with its descendants, `memory.max`
 //! ```
 //!
-//! Source: "Control Group v2" of the Linux kernel's documentation. A group with processes of its own
-//! passes no controller on to children, except at the root of the hierarchy: the groups are therefore
-//! siblings of Closecall's own one. A slice of systemd is no place for them ("Control Group APIs and
-//! Delegation" of systemd): who kills the scope of Closecall would not reach them.
+//! Source: "Control Group v2" of the Linux kernel's documentation. A group with processes of its
+//! own passes no controller on to children, except at the root of the hierarchy: the groups are
+//! therefore siblings of Closecall's own one. A slice of systemd is no place for them ("Control
+//! Group APIs and Delegation" of systemd): who kills the scope of Closecall would not reach them.
 //!
 //! The sum over the descendants is looked at besides, since a process is moved into its group just
 //! after its start. Without a place, as under cgroup v1 or in most containers, there is no group.
@@ -47,8 +47,8 @@ static PARENT: OnceLock<Option<PathBuf>> = OnceLock::new();
 /// Number of groups so far.
 static CREATED: AtomicU64 = AtomicU64::new(0);
 
-/// The group of one process and its descendants. They are killed, and the group is removed, when this
-/// value is dropped.
+/// The group of one process and its descendants. They are killed, and the group is removed, when
+/// this value is dropped.
 #[derive(Debug)]
 pub(super) struct Group(PathBuf);
 
@@ -112,7 +112,8 @@ fn has_oom_kill(events: &str) -> bool {
     counts.filter_map(|count| count.trim().parse::<u64>().ok()).any(|count| count > 0)
 }
 
-/// Returns the group beside which this program runs, if groups that limit memory can be created there.
+/// Returns the group beside which this program runs, if groups that limit memory can be created
+/// there.
 fn own_parent() -> Option<PathBuf> {
     if !cfg!(target_os = "linux") {
         return None;
@@ -144,8 +145,8 @@ fn own_group(mounts: &str, groups: &str) -> Option<PathBuf> {
     (is_plain && below != Path::new("")).then(|| Path::new(mount).join(below))
 }
 
-/// Returns the root within the hierarchy and the mount point, if a line of `/proc/self/mountinfo` is
-/// that of cgroup v2: `30 23 0:26 / /sys/fs/cgroup rw,nosuid shared:4 - cgroup2 cgroup2 rw`.
+/// Returns the root within the hierarchy and the mount point, if a line of `/proc/self/mountinfo`
+/// is that of cgroup v2: `30 23 0:26 / /sys/fs/cgroup rw,nosuid shared:4 - cgroup2 cgroup2 rw`.
 fn cgroup2_mount(line: &str) -> Option<(&str, &str)> {
     let (mount, system) = line.split_once(" - ")?;
     let mut fields = mount.split(' ').skip(3);

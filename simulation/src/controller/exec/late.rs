@@ -1,6 +1,6 @@
 //! What went wrong with a process after its last answer, as it unloaded its library: a destructor
-//! of a static object that crashes, for example. No sample is concerned, so that none pays for it. A
-//! command says it at its end.
+//! of a static object that crashes, for example. No sample is concerned, so that none pays for it.
+//! A command says it at its end.
 
 use std::collections::BTreeSet;
 use std::process::ExitStatus;

@@ -20,19 +20,23 @@
 //! units. Both sides ignore unknown keys.
 //!
 //! 1. Closecall sends
-//!    `{"type":"hello","protocol":1,"control_step_s":0.04,"settings":{…},"road":{…}}`. `settings` are the settings of the scenario's `ego-stack` (`acc`, `aeb`, `mis`, `automated`; `null` if absent), `road` has `lanes`, `lane_width_m`, `curvature_per_m`, `speed_limit_mps` and `overtaking_side`.
+//!    `{"type":"hello","protocol":1,"control_step_s":0.04,"settings":{…},"road":{…}}`. `settings`
+//!    are the settings of the scenario's `ego-stack` (`acc`, `aeb`, `mis`, `automated`; `null` if
+//!    absent), `road` has `lanes`, `lane_width_m`, `curvature_per_m`, `speed_limit_mps` and
+//!    `overtaking_side`.
 //! 2. The process answers `{"type":"hello","protocol":1}` within 10 s, or within the timeout of 4.
 //!    if that is longer. The answer may have `name` and `version`, which a campaign keeps: it is
 //!    not resumed with a process that states others.
 //! 3. At each control step, Closecall sends
-//!    `{"type":"step","time_s":…,"time_ns":…,"odometry":{…},"front":{…}|null,"tracks":[…],
-//!    "sensors":{…}}`. `odometry` has the fields of [`Odometry`](closecall_controllers::Odometry), `front` the fields of [`Front`](closecall_controllers::Front):
-//!    the lead vehicle, selected as in the built-in controllers. A track has `id`, `source`
-//!    (`front`, `surround`, `rear`), `status` (`tentative`, `confirmed`, `coasting`), `time_s`,
-//!    `x_m`, `y_m` (its centre in the ego's frame: x ahead, y to the left), `vx_mps`, `vy_mps`
-//!    (over ground), `covariance` (4 × 4, of these four), `heading_rad`, `length_m`, `width_m`,
-//!    `class` {`car`, `truck`, `motorcycle`, `background`}, `existence`, and `lane` {`left`, `own`,
-//!    `right`}. `sensors` has `front`, `surround`, `rear`: whether each works.
+//!    `{"type":"step","time_s":…,"time_ns":…,"odometry":{…},"front":{…}|null,"tracks":[…], "sensors":{…}}`.
+//!    `odometry` has the fields of [`Odometry`](closecall_controllers::Odometry), `front` the
+//!    fields of [`Front`](closecall_controllers::Front): the lead vehicle, selected as in the
+//!    built-in controllers. A track has `id`, `source` (`front`, `surround`, `rear`), `status`
+//!    (`tentative`, `confirmed`, `coasting`), `time_s`, `x_m`, `y_m` (its centre in the ego's
+//!    frame: x ahead, y to the left), `vx_mps`, `vy_mps` (over ground), `covariance` (4 × 4, of
+//!    these four), `heading_rad`, `length_m`, `width_m`, `class` {`car`, `truck`, `motorcycle`,
+//!    `background`}, `existence`, and `lane` {`left`, `own`, `right`}. `sensors` has `front`,
+//!    `surround`, `rear`: whether each works.
 //! 4. The process answers `{"acceleration_mps2":-0.4,"state":"following"}`, within
 //!    `--controller-timeout-ms`. `state` is one of `following`, `increasing`, `holding`,
 //!    `releasing`, `emergency-braking`. The answer may repeat the `time_ns` of its step, which is

@@ -11,8 +11,9 @@
 //! ended becomes a child of this program, whatever session it belongs to. The end of a controller
 //! kills the orphans with its mark.
 //!
-//! The guard covers the case in which this program is killed by SIGKILL and can do nothing itself. One case remains: a
-//! process that has both left the process group and cleared its environment survives a SIGKILL of this program.
+//! The guard covers the case in which this program is killed by SIGKILL and can do nothing itself.
+//! One case remains: a process that has both left the process group and cleared its environment
+//! survives a SIGKILL of this program.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

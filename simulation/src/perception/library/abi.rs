@@ -1,4 +1,5 @@
-//! The types of `controllers/include/closecall_perception.h`, which documents their fields and units.
+//! The types of `controllers/include/closecall_perception.h`, which documents their fields and
+//! units.
 
 use std::ffi::{c_char, c_void};
 use std::mem::size_of;
@@ -179,7 +180,8 @@ pub(super) struct AnswerView {
     pub(super) count: u64,
 }
 
-// An exception of C++ that leaves a function ends the process, which is defined for `C-unwind` only.
+// An exception of C++ that leaves a function ends the process, which is defined for `C-unwind`
+// only.
 pub(super) type AbiFunction = unsafe extern "C-unwind" fn() -> u32;
 pub(super) type AnswersFunction = unsafe extern "C-unwind" fn() -> i32;
 pub(super) type CreateFunction = unsafe extern "C-unwind" fn(*const SetupView) -> *mut c_void;

@@ -51,7 +51,8 @@ impl Library {
         let shared = SharedLibrary::open(path, &NEEDED, PREFIX)?;
         let [abi, answers, create, step, destroy] = NEEDED;
         let _kept = Arithmetic::keep();
-        // SAFETY: the header declares the functions with these types. The version is asked for first.
+        // SAFETY: the header declares the functions with these types. The version is asked for
+        // first.
         unsafe {
             let stated_abi = shared.function::<AbiFunction>(abi)?;
             let actual = foreign_call(abi, || stated_abi());
@@ -143,7 +144,8 @@ impl Run<'_> {
             count: 0,
         };
         let kept = Arithmetic::keep();
-        // SAFETY: the perception lives until it is dropped, and both views with their lists are valid during the call.
+        // SAFETY: the perception lives until it is dropped, and both views with their lists are
+        // valid during the call.
         let result = with_input(setup, question, |input| {
             foreign_call(NEEDED[3], || unsafe { (self.library.step)(self.perception, input, &mut answer) })
         })?;
@@ -173,7 +175,8 @@ impl Drop for Run<'_> {
     }
 }
 
-/// Returns a detection with the defaults of the interface. What has none is NaN, and refused if it stays so.
+/// Returns a detection with the defaults of the interface. What has none is NaN, and refused if it
+/// stays so.
 const fn unset_detection(time_ns: i64) -> Detection {
     Detection {
         x_m: f64::NAN,
@@ -192,7 +195,8 @@ const fn unset_detection(time_ns: i64) -> Detection {
     }
 }
 
-/// A track with the defaults of the interface. What has none is NaN, or no status, and refused if it stays so.
+/// A track with the defaults of the interface. What has none is NaN, or no status, and refused if
+/// it stays so.
 const UNSET_TRACK: Track = Track {
     id: 0,
     status: -1,

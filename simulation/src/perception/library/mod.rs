@@ -1,17 +1,18 @@
-//! A perception that is a shared library with the functions of `controllers/include/closecall_perception.h`:
-//! `sensors.perception = "lib:PATH"`.
+//! A perception that is a shared library with the functions of
+//! `controllers/include/closecall_perception.h`: `sensors.perception = "lib:PATH"`.
 //!
 //! ```text
 //!  run ── hello, one line per control step with scans ──▶ process: `closecall host perceive PATH` ─▶ library
 //!      ◀── hello, one line of detections or tracks ─────                                          ◀─
 //! ```
 //!
-//! The code of a library can do anything to the process that loads it. Each run therefore starts a process of this program, which
-//! speaks the protocol of a perception process, with the same limits. A crash costs one sample.
+//! The code of a library can do anything to the process that loads it. Each run therefore starts a
+//! process of this program, which speaks the protocol of a perception process, with the same
+//! limits. A crash costs one sample.
 //!
-//! The process writes every number as the library gives it. The run checks them, so that a message has the name of the field. JSON
-//! has no number that is not finite: it is written as a word, which is refused. A failure of the library is an answer with the key
-//! `error`.
+//! The process writes every number as the library gives it. The run checks them, so that a message
+//! has the name of the field. JSON has no number that is not finite: it is written as a word, which
+//! is refused. A failure of the library is an answer with the key `error`.
 
 mod abi;
 mod loaded;
@@ -30,8 +31,8 @@ use crate::controller::native::Probe;
 use crate::perception::answer::ERROR_KEY;
 use crate::perception::message::Message;
 
-/// Loads a library in this process, and writes a line to `answers` that says what it is. The library
-/// is unloaded afterwards.
+/// Loads a library in this process, and writes a line to `answers` that says what it is. The
+/// library is unloaded afterwards.
 ///
 /// # Errors
 /// The message of the failure.
@@ -45,7 +46,8 @@ pub fn probe(path: &Path, mut answers: impl Write) -> Result<(), String> {
     writeln!(answers, "{text}").and_then(|()| answers.flush()).map_err(|error| error.to_string())
 }
 
-/// Loads a library in this process, and answers every message of `requests` with a line to `answers`, until there are no more.
+/// Loads a library in this process, and answers every message of `requests` with a line to
+/// `answers`, until there are no more.
 ///
 /// # Errors
 /// The message of the failure, after which the process is to end.

@@ -91,7 +91,8 @@ impl Setup {
     }
 }
 
-/// Calls `f` with a question in the form of the interface, or returns what is wrong with the question.
+/// Calls `f` with a question in the form of the interface, or returns what is wrong with the
+/// question.
 pub(super) fn with_input<T>(
     setup: &Setup,
     question: &Scans,

@@ -9,8 +9,9 @@ use crate::world::Action;
 use closecall_scenarios::outcome::{EndReason, Moment};
 
 impl Run<'_> {
-    /// Determines the actions of all vehicles, from the current state: of the human drivers, of the scenario's events, and
-    /// of the ego controller. If a human drives the ego, the controller acts only by emergency braking.
+    /// Determines the actions of all vehicles, from the current state: of the human drivers, of the
+    /// scenario's events, and of the ego controller. If a human drives the ego, the controller acts
+    /// only by emergency braking.
     pub(super) fn decide_actions(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let time = self.world.time();
         self.events.update(&self.world, |event| {
