@@ -148,7 +148,8 @@ fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     builder.prefix(TEMPORARY_PREFIX).tempfile_in(folder).map_err(without_path)
 }
 
-/// Removes the temporary name from an error of `tempfile`: the caller names the file that it writes.
+/// Removes the temporary name from an error of `tempfile`: the caller names the file that it
+/// writes.
 fn without_path(error: io::Error) -> io::Error {
     match error.to_string().split_once(" at path ") {
         Some((reason, _)) => io::Error::new(error.kind(), reason),

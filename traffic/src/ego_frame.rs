@@ -95,8 +95,8 @@ impl<'a> EgoFrame<'a> {
         (self.s_m + arc_length_m, self.lateral_position_m(x_m, y_m))
     }
 
-    /// Returns the length of path that a vehicle at (`s_m`, `d_m`) covers per metre of the reference
-    /// line (m/m).
+    /// Returns the length of path that a vehicle at (`s_m`, `d_m`) covers per metre of the
+    /// reference line (m/m).
     pub fn path_scale(&self, s_m: f64, d_m: f64) -> f64 {
         self.road.path_scale(s_m, d_m)
     }

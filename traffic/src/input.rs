@@ -85,8 +85,8 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     Ok(without_mark(&text).map(str::to_owned).unwrap_or(text))
 }
 
-/// Returns true if a file was read, and its content is the fault: it is no text, or too large. Another
-/// error is one of the system.
+/// Returns true if a file was read, and its content is the fault: it is no text, or too large.
+/// Another error is one of the system.
 pub fn is_of_content(error: &io::Error) -> bool {
     error.kind() == ErrorKind::InvalidData
 }

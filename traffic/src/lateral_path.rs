@@ -1,9 +1,10 @@
-//! The lateral path of a vehicle: its lateral position as a function of the distance along the road.
+//! The lateral path of a vehicle: its lateral position as a function of the distance along the
+//! road.
 //!
-//! Between two points of the path, the lateral position is a quintic polynomial. Its first and second
-//! derivatives at the points are the derivatives of the parabola through the point and its two neighbours, so
-//! that the lateral acceleration of a vehicle on the path does not jump. The path ends parallel to
-//! the road.
+//! Between two points of the path, the lateral position is a quintic polynomial. Its first and
+//! second derivatives at the points are the derivatives of the parabola through the point and its
+//! two neighbours, so that the lateral acceleration of a vehicle on the path does not jump. The
+//! path ends parallel to the road.
 
 use crate::Quintic;
 
@@ -15,9 +16,9 @@ pub struct LateralPath {
 }
 
 impl LateralPath {
-    /// Creates the path through points: each the distance along the road since the start (m) and the
-    /// lateral position, positive to the left (m). Returns `None` unless the distances start at 0 and
-    /// increase, and there are at least two points.
+    /// Creates the path through points: each the distance along the road since the start (m) and
+    /// the lateral position, positive to the left (m). Returns `None` unless the distances start at
+    /// 0 and increase, and there are at least two points.
     pub fn new(points: &[[f64; 2]]) -> Option<Self> {
         let increases = points.windows(2).all(|pair| pair[1][0] > pair[0][0]);
         let starts_at_zero = points.first().is_some_and(|first| first[0] == 0.0);
@@ -33,16 +34,16 @@ impl LateralPath {
     }
 
     /// Returns the lateral position (m) after a distance of `travelled_m` along the road, and its
-    /// first and second derivative with respect to this distance. Beyond the end, it is the state at
-    /// the end.
+    /// first and second derivative with respect to this distance. Beyond the end, it is the state
+    /// at the end.
     pub fn at(&self, travelled_m: f64) -> [f64; 3] {
         let after = self.pieces.partition_point(|(from_m, _)| *from_m <= travelled_m);
         let (from_m, piece) = &self.pieces[after.saturating_sub(1)];
         piece.at((travelled_m - from_m).clamp(0.0, piece.length()))
     }
 
-    /// Returns the largest magnitude of the second derivative (1/m), from samples at every 10 % of each
-    /// piece.
+    /// Returns the largest magnitude of the second derivative (1/m), from samples at every 10 % of
+    /// each piece.
     pub fn largest_second_derivative_per_m(&self) -> f64 {
         let in_piece = |piece: &Quintic| {
             let at = |tenth: i32| piece.at(piece.length() * f64::from(tenth) / 10.0)[2].abs();

@@ -33,8 +33,8 @@ impl Value {
     }
 }
 
-/// Returns a number for readers, with four significant digits. A number is never shown as zero if it
-/// is none.
+/// Returns a number for readers, with four significant digits. A number is never shown as zero if
+/// it is none.
 pub fn readable(value: f64) -> String {
     match significant(value, READABLE_DIGITS) {
         zero if zero == "0" && value != 0.0 => value.to_string(),

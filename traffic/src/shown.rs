@@ -2,17 +2,17 @@
 //!
 //! A controller chooses the text of its messages, and the author of a folder chooses the names in
 //! it. Control characters move the cursor of a terminal and hide text, characters for bidirectional
-//! text change the order in which a line is read, and invisible characters carry text that no reader
-//! sees. Each of them is shown as its number instead, in the notation of JSON: `\u001b`, and
+//! text change the order in which a line is read, and invisible characters carry text that no
+//! reader sees. Each of them is shown as its number instead, in the notation of JSON: `\u001b`, and
 //! `\udb40\udc41` beyond U+FFFF. A line of JSON therefore keeps its meaning.
 
 use std::borrow::Cow;
 
 /// Returns true if a character is shown as its number: a control character other than tab and line
 /// feed, a character that changes the direction of text (Unicode UAX #9, section 2) or the end of a
-/// line (U+2028, U+2029), or an invisible one (the property `Default_Ignorable_Code_Point` of Unicode
-/// 16, and the interlinear annotations). The joiners and the variation selectors of scripts and
-/// pictograms stay (U+180B to U+180D, U+180F, U+200C, U+200D, U+FE00 to U+FE0F).
+/// line (U+2028, U+2029), or an invisible one (the property `Default_Ignorable_Code_Point` of
+/// Unicode 16, and the interlinear annotations). The joiners and the variation selectors of scripts
+/// and pictograms stay (U+180B to U+180D, U+180F, U+200C, U+200D, U+FE00 to U+FE0F).
 const fn is_hidden(c: char) -> bool {
     match c {
         '\t' | '\n' => false,

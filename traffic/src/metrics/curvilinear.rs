@@ -15,12 +15,12 @@
 //!
 //! The closest encounter is defined for any motion model: DCE(t) = min d(p₁(t + τ), p₂(t + τ)) over
 //! τ ≥ 0 (J. Eggert, *Predictive risk estimation for intelligent ADAS functions*, ITSC 2014; L.
-//! Westhofen et al., *Criticality Metrics for Automated Driving: A Review and Suitability Analysis*,
-//! Archives of Computational Methods in Engineering, 2023, which call the model the dynamic motion
-//! model). In the classes of S. Lefèvre et al. (*A survey on motion prediction and risk assessment
-//! for intelligent vehicles*, ROBOMECH Journal, 2014), a constant velocity is a physics-based motion
-//! model. The model of this module is a manoeuvre-based one: keep the lane, or complete the lane
-//! change.
+//! Westhofen et al., *Criticality Metrics for Automated Driving: A Review and Suitability
+//! Analysis*, Archives of Computational Methods in Engineering, 2023, which call the model the
+//! dynamic motion model). In the classes of S. Lefèvre et al. (*A survey on motion prediction and
+//! risk assessment for intelligent vehicles*, ROBOMECH Journal, 2014), a constant velocity is a
+//! physics-based motion model. The model of this module is a manoeuvre-based one: keep the lane, or
+//! complete the lane change.
 //!
 //! Both movements are linear between the instants at which a vehicle settles. Each such phase has
 //! the exact closest encounter of [`closest_encounter`]; the result is the nearest of them.
@@ -116,15 +116,16 @@ mod tests {
 
     #[test]
     fn a_vehicle_in_the_lane_beyond_the_next_one_is_no_collision_course() {
-        // The ego moves by 3.5 m to the left within 3.5 s. Another car, 10 m/s slower, drives two lanes
-        // further left, 45 m ahead.
+        // The ego moves by 3.5 m to the left within 3.5 s. Another car, 10 m/s slower, drives two
+        // lanes further left, 45 m ahead.
         let ego = car(0.0, -8.75, 30.0, 1.0);
         let other = settling(car(45.0, -1.75, 20.0, 0.0), 0.0);
         let straight = closest_encounter(&ego, &other.moving, HORIZON_S).unwrap();
         let along = curvilinear_encounter(&settling(ego, 3.5), &other, HORIZON_S).unwrap();
-        // With a constant velocity the ego is 2.25 m further left when it has overtaken the car by its
-        // length, at 4.9 s: 7 - 4.9 - 2 = 0.1 m. Settled, both pass with a lane between them from the
-        // moment at which the front of the ego reaches the rear of the other, at 4.1 s: 3.5 - 2 = 1.5 m.
+        // With a constant velocity the ego is 2.25 m further left when it has overtaken the car by
+        // its length, at 4.9 s: 7 - 4.9 - 2 = 0.1 m. Settled, both pass with a lane between them
+        // from the moment at which the front of the ego reaches the rear of the other, at 4.1 s:
+        // 3.5 - 2 = 1.5 m.
         assert!((straight.dce_m - 0.1).abs() < 0.02, "{straight:?}");
         assert!((along.dce_m - 1.5).abs() < 1e-12 && (along.ttce_s - 4.1).abs() < 1e-9, "{along:?}");
     }
@@ -139,8 +140,8 @@ mod tests {
 
     #[test]
     fn vehicles_of_the_same_speed_are_nearest_where_the_last_one_settles() {
-        // Side by side at the same speed, two lanes apart, each moves a metre towards the other: one in
-        // 1 s, the other in 4 s.
+        // Side by side at the same speed, two lanes apart, each moves a metre towards the other:
+        // one in 1 s, the other in 4 s.
         let one = settling(car(0.0, 0.0, 30.0, 1.0), 1.0);
         let other = settling(car(1.0, 7.0, 30.0, -0.25), 4.0);
         let encounter = curvilinear_encounter(&one, &other, HORIZON_S).unwrap();
@@ -198,7 +199,8 @@ mod tests {
             match curvilinear_encounter(&a, &b, HORIZON_S) {
                 Ok(Encounter { dce_m, ttce_s }) => {
                     prop_assert!(dce_m <= nearest_m + 1e-6, "{dce_m} at {ttce_s}, {nearest_m}");
-                    // A box turns when it settles: its distance jumps there, by less than its length.
+                    // A box turns when it settles: its distance jumps there, by less than its
+                    // length.
                     let slack_m = 0.01 * 50.0 + 0.3 * (a.moving.shape.length_m + b.moving.shape.length_m);
                     prop_assert!(nearest_m <= dce_m + slack_m, "{dce_m} at {ttce_s}, {nearest_m}");
                 }

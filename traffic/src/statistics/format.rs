@@ -23,8 +23,8 @@ pub fn significant(value: f64, digits: i32) -> String {
     without_trailing_zeros(&format!("{value:.decimals$}"))
 }
 
-/// Returns the text of a number without trailing zeros, and of zero without a sign: `2.50` is `2.5`,
-/// and `-0.00` is `0`.
+/// Returns the text of a number without trailing zeros, and of zero without a sign: `2.50` is
+/// `2.5`, and `-0.00` is `0`.
 pub fn without_trailing_zeros(number: &str) -> String {
     let text = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

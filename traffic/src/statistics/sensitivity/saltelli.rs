@@ -188,7 +188,8 @@ impl Design {
             })
         };
         let is_event = outputs.iter().flatten().all(|output| *output == 0.0 || (output - 1.0).abs() <= f64::EPSILON);
-        // A mean lies where the outputs can lie: the mean of harm is not negative, the mean of an event at most 1.
+        // A mean lies where the outputs can lie: the mean of harm is not negative, the mean of an
+        // event at most 1.
         let is_positive = outputs.iter().flatten().all(|output| *output >= 0.0);
         let range = [if is_positive { 0.0 } else { f64::NEG_INFINITY }, if is_event { 1.0 } else { f64::INFINITY }];
         let bounded = |quarter: usize| mean(quarter).map(|mean| mean.within(range));
@@ -265,10 +266,10 @@ fn with(estimate: Option<Estimate>, interval_95: [f64; 2]) -> Option<Estimate> {
 }
 
 /// Returns the largest variance that rounding alone can give outputs without variance.
-/// `sum_of_squares` is the sum over all replicates. The sum of n squares is wrong by at most n ε / 2
-/// of itself, and the mean square therefore by ε / 2 of the sum. The squared mean is wrong by twice
-/// as much (N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, SIAM 2002, section 4.2).
-/// The factor leaves room for the sums that the jackknife subtracts.
+/// `sum_of_squares` is the sum over all replicates. The sum of n squares is wrong by at most n ε /
+/// 2 of itself, and the mean square therefore by ε / 2 of the sum. The squared mean is wrong by
+/// twice as much (N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, SIAM 2002,
+/// section 4.2). The factor leaves room for the sums that the jackknife subtracts.
 fn rounding_error(sum_of_squares: f64) -> f64 {
     4.0 * f64::EPSILON * sum_of_squares
 }
