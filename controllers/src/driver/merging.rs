@@ -13,19 +13,19 @@
 //! - *Gap acceptance.* The change is mandatory: it gains nothing but the way. A gap is accepted if
 //!   neither the driver nor the follower in the through lane must brake harder than a limit, and if
 //!   a least gap is left to both ([`GapAcceptance`]). The limits grow towards the end of the lane,
-//!   as in Vissim's necessary lane change ([`tolerance`]). Recorded drivers leave short gaps
-//!   when they merge, less than 0.25 s ahead and behind, which grow afterwards; in free traffic most
-//!   of them merge in the first half of the lane (Daamen, Loot and Hoogendoorn, *Empirical analysis
-//!   of merging behavior at freeway on-ramp*, Transportation Research Record 2188 (2010) 108–118).
+//!   as in Vissim's necessary lane change ([`tolerance`]). Recorded drivers leave short gaps when
+//!   they merge, less than 0.25 s ahead and behind, which grow afterwards; in free traffic most of
+//!   them merge in the first half of the lane (Daamen, Loot and Hoogendoorn, *Empirical analysis of
+//!   merging behavior at freeway on-ramp*, Transportation Research Record 2188 (2010) 108–118).
 //! - *End of the lane.* Without a gap, the driver brakes as soon as a comfortable deceleration is
 //!   needed to stop before the end. It then waits for a gap.
 //! - *Change.* While the driver changes lanes, it follows the vehicle ahead in the through lane.
 //!
-//! The driver perceives the through lane as it perceives a passing lane: one reaction time late, and
-//! without a speed difference too small to be noticed. The reaction time there is the typical one,
-//! not the one drawn for the vehicle ahead. The driver does not adjust its speed to reach a certain
-//! gap, and nobody in the through lane makes room for it: simplifications, which make merging
-//! harder than it is.
+//! The driver perceives the through lane as it perceives a passing lane: one reaction time late,
+//! and without a speed difference too small to be noticed. The reaction time there is the typical
+//! one, not the one drawn for the vehicle ahead. The driver does not adjust its speed to reach a
+//! certain gap, and nobody in the through lane makes room for it: simplifications, which make
+//! merging harder than it is.
 
 use closecall_traffic::{AccelerationLane, Indicator, Side, Stream};
 
@@ -55,18 +55,18 @@ const DISTANCE_PER_MPS2_M: f64 = 200.0;
 const SAFE_GAP_SHARE: f64 = 0.6;
 
 /// Deceleration that, once it is needed to stop before the end of the lane, makes the driver brake
-/// (m/s²): at least this is what 90 % of drivers choose when they must stop (Fambro, Fitzpatrick and
-/// Koppa, NCHRP Report 400, 1997; the stopping sight distance of AASHTO rests on it). Range: 2 to
-/// 4.5.
+/// (m/s²): at least this is what 90 % of drivers choose when they must stop (Fambro, Fitzpatrick
+/// and Koppa, NCHRP Report 400, 1997; the stopping sight distance of AASHTO rests on it). Range: 2
+/// to 4.5.
 pub const ENTRY_STOP_MPS2: f64 = 3.4;
 
 /// Distance from the end of the lane at which the driver stops (m): an assumption, the gap at
 /// standstill of the Intelligent Driver Model; 1 to 5 are plausible.
 const STOP_BEFORE_END_M: f64 = 2.0;
 
-/// Longest and shortest duration of the lane change (s). The longest is the usual duration of single
-/// lane changes (Lee, Olsen and Wierwille, DOT HS 809 702, 2004), the shortest the duration in
-/// Vissim.
+/// Longest and shortest duration of the lane change (s). The longest is the usual duration of
+/// single lane changes (Lee, Olsen and Wierwille, DOT HS 809 702, 2004), the shortest the duration
+/// in Vissim.
 const DURATION_S: [f64; 2] = [6.3, 3.0];
 
 /// Gain with which the driver keeps the speed of the ramp (1/s): numerical, well below the

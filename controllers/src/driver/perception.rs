@@ -36,8 +36,8 @@
 //!   second leader is half of the sensitivity to the vehicle ahead (Hoogendoorn and Ossen 2006; see
 //!   [`PerceptionConfig`]).
 //! - *Leader that leaves.* A lane change takes seconds, and the driver foresees its end. Once the
-//!   vehicle ahead is out of the lane, the driver reacts to the next vehicle at once, if that vehicle
-//!   was in view one reaction time ago. The driver then uses what it knows of that vehicle.
+//!   vehicle ahead is out of the lane, the driver reacts to the next vehicle at once, if that
+//!   vehicle was in view one reaction time ago. The driver then uses what it knows of that vehicle.
 //! - *Evidence.* A driver may accumulate looming evidence instead of using the threshold and the
 //!   brake light: see [`evidence`].
 
@@ -300,8 +300,8 @@ struct Extrapolation {
 
 impl Extrapolation {
     /// Returns the perceived speed of a vehicle in the adjacent lane (m/s): the true speed, or the
-    /// driver's own speed if the driver notices no difference. The driver looks there too briefly to
-    /// attend to a difference.
+    /// driver's own speed if the driver notices no difference. The driver looks there too briefly
+    /// to attend to a difference.
     fn adjacent_speed_mps(&self, observed: &ObservedVehicle) -> f64 {
         let notices = observed.visual_angle_rate_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
         if notices { observed.speed_mps } else { self.own_speed_then_mps }

@@ -6,8 +6,9 @@
 //!  sensors ─▶ emergency braking ─ braking ─┘
 //! ```
 //!
-//! It is one of the human drivers that follow other vehicles. Like them it sees the true traffic, late and imprecisely, and not the
-//! tracks of the sensors. Emergency braking is the only function beside it: no cruise control, and no margin increase system.
+//! It is one of the human drivers that follow other vehicles. Like them it sees the true traffic,
+//! late and imprecisely, and not the tracks of the sensors. Emergency braking is the only function
+//! beside it: no cruise control, and no margin increase system.
 
 use closecall_traffic::{Check, ConfigError, Parameters};
 
@@ -23,7 +24,8 @@ pub enum EgoDriver {
 }
 
 impl EgoDriver {
-    /// Checks the table `human` of an ego stack. Reaction, lapses and perception belong to the car-following model here.
+    /// Checks the table `human` of an ego stack. Reaction, lapses and perception belong to the
+    /// car-following model here.
     ///
     /// # Errors
     /// [`ConfigError`] if a value is out of range.

@@ -12,19 +12,20 @@
 //! up as a human driver's does in an emergency (12.65 m/s³, UN Regulation 157). A slower build-up
 //! must brake harder in the end, in front of a rear vehicle that has come nearer.
 //!
-//! While the rear vehicle would reach the ego within the holding time and can pull out, the extended
-//! MIS defers all braking, as long as the assured braking still stops the ego behind the lead
-//! vehicle. Emergency braking waits too. The margin is there for this moment: the rear vehicle needs
-//! it to pull out.
+//! While the rear vehicle would reach the ego within the holding time and can pull out, the
+//! extended MIS defers all braking, as long as the assured braking still stops the ego behind the
+//! lead vehicle. Emergency braking waits too. The margin is there for this moment: the rear vehicle
+//! needs it to pull out.
 //!
 //! The result is the *comfort command*. Emergency braking overrides it if it requests more braking.
 //! The jerk limits hold for the comfort command alone, and each step starts from the comfort
 //! command of the step before: while emergency braking acts, the comfort command goes on beneath
 //! it, and once emergency braking ends, the ego follows the comfort command at once. A ramp that
 //! started from the command of emergency braking would keep the ego braking for seconds after the
-//! lead vehicle has stopped braking. If a human drives, there is no comfort command: emergency braking commands, and
-//! the loop lets the driver decide whenever emergency braking does not act. After emergency braking the MIS takes no further speed while
-//! the gap to the lead vehicle does not close.
+//! lead vehicle has stopped braking. If a human drives, there is no comfort command: emergency
+//! braking commands, and the loop lets the driver decide whenever emergency braking does not act.
+//! After emergency braking the MIS takes no further speed while the gap to the lead vehicle does
+//! not close.
 
 use closecall_traffic::Time;
 
@@ -92,7 +93,8 @@ impl EgoStack {
         let (last_mps2, step_s) =
             self.last_comfort.map_or((0.0, 0.0), |(time, last_mps2)| (last_mps2, (input.time - time).s()));
         let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);
-        // Emergency braking ends a cruise control that does not look ahead: the driver takes over, and does not accelerate.
+        // Emergency braking ends a cruise control that does not look ahead: the driver takes over,
+        // and does not accelerate.
         let is_over = self.has_braked && !self.settings.acc.looks_ahead();
         let acc_mps2 = if is_over { acc_mps2.min(0.0) } else { acc_mps2 };
         let acc_mps2 = Acc::limit_jerk_mps2(acc_mps2, last_mps2, speed_mps, step_s);

@@ -1,7 +1,7 @@
 //! Calls of functions of a library that an exception of C++ must not leave.
 //!
-//! Rust cannot catch an exception of another language, nor read its text: an exception that leaves a
-//! function of a library would end the process with a message that says nothing to the author of
+//! Rust cannot catch an exception of another language, nor read its text: an exception that leaves
+//! a function of a library would end the process with a message that says nothing to the author of
 //! the library. On its way it passes the frame of the call, which names the function and ends the
 //! process itself.
 
