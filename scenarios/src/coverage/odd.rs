@@ -1,7 +1,8 @@
 //! Attributes of the operational design domain.
 //!
-//! The names and the limits of the classes come from ISO 34503:2023, as the OpenODD taxonomy of the Autoware Foundation
-//! lists them (`Domain_Concepts_Definition_ISO_34503.yaml`). ISO 34503 has no class for what is absent: `none` and `dry` are ours.
+//! The names and the limits of the classes come from ISO 34503:2023, as the OpenODD taxonomy of the
+//! Autoware Foundation lists them (`Domain_Concepts_Definition_ISO_34503.yaml`). ISO 34503 has no
+//! class for what is absent: `none` and `dry` are ours.
 
 use closecall_traffic::{Environment, Light, Road};
 use schemars::JsonSchema;

@@ -2,8 +2,8 @@
 //! curves of third degree are replaced by pieces whose curvature changes linearly.
 //!
 //! The curvature of a curve is sampled along its length. The samples that a linear interpolation
-//! reproduces are left out (Douglas and Peucker 1973), until at most [`Alignment::MAX_POINTS`] remain.
-//! The line that results is compared with the positions in the file: it may deviate by
+//! reproduces are left out (Douglas and Peucker 1973), until at most [`Alignment::MAX_POINTS`]
+//! remain. The line that results is compared with the positions in the file: it may deviate by
 //! [`MOST_DEVIATION_M`].
 
 use std::path::Path;
@@ -245,8 +245,8 @@ fn simplified(points: &[AlignmentPoint], tolerance_per_m: f64) -> Vec<AlignmentP
     points.iter().zip(is_kept).filter(|(_, is_kept)| *is_kept).map(|(point, _)| *point).collect()
 }
 
-/// Returns the largest distance between the line and the points of the file (m), or `None` if a piece
-/// does not say where it begins.
+/// Returns the largest distance between the line and the points of the file (m), or `None` if a
+/// piece does not say where it begins.
 fn deviation_m(path: &Path, plan: &Node, samples: &[Sample], line: &Alignment) -> Option<f64> {
     let first = plan.all("geometry").next()?;
     let value = |name| number(path, first, name).ok();
@@ -269,7 +269,8 @@ mod tests {
     use super::super::dom::parse;
     use super::*;
 
-    /// Returns the answer for pieces `(x, y, hdg, length, shape)` of a reference line, and its notes.
+    /// Returns the answer for pieces `(x, y, hdg, length, shape)` of a reference line, and its
+    /// notes.
     fn read(pieces: &[(f64, f64, f64, f64, &str)]) -> (Result<Alignment, String>, Vec<String>) {
         let (path, mut notes) = (Path::new("road.xodr"), Vec::new());
         let mut text = "<planView>".to_owned();
@@ -280,7 +281,8 @@ mod tests {
         (alignment(path, &plan, &mut notes).unwrap(), notes)
     }
 
-    /// Returns the pieces of an alignment from s = 0 on, with the start (100, −20) and the heading 0.7.
+    /// Returns the pieces of an alignment from s = 0 on, with the start (100, −20) and the heading
+    /// 0.7.
     fn pieces<'a>(line: &Alignment, shapes: &[(f64, &'a str)]) -> Vec<(f64, f64, f64, f64, &'a str)> {
         let (sin, cos) = maths::sin_cos(0.7);
         let mut s_m = 0.0;

@@ -82,8 +82,8 @@ impl Node {
         path.iter().try_fold(self, |node, name| node.child(name))
     }
 
-    /// Returns the hash of all elements but the header, so that an edited file is noticed. White space
-    /// between elements does not count.
+    /// Returns the hash of all elements but the header, so that an edited file is noticed. White
+    /// space between elements does not count.
     pub(super) fn content_hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         self.children.iter().filter(|child| child.name != "FileHeader").for_each(|child| child.add_to(&mut hasher));

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::maths;
 
-/// The values of the parameters that an element can use: its own declarations, and the declarations of the
-/// elements around it. An inner value hides an outer one of the same name.
+/// The values of the parameters that an element can use: its own declarations, and the declarations
+/// of the elements around it. An inner value hides an outer one of the same name.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Values<'a> {
     inner: BTreeMap<String, String>,

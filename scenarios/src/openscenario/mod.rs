@@ -5,11 +5,11 @@
 //! ```
 //!
 //! The storyboard is played once with vehicles that follow their actions exactly. The motion of the
-//! other vehicles becomes a prescribed driver: speeds and lane changes at their times, and a lateral
-//! path if a vehicle drives beside the centre of its lane. If a trigger refers to the ego, its time
-//! holds for an ego that keeps the speed of the file, as in a nominal encounter: it is the same for
-//! every controller. An element that a scenario cannot express is an error with file, line and
-//! element, or a note; nothing is left out in silence.
+//! other vehicles becomes a prescribed driver: speeds and lane changes at their times, and a
+//! lateral path if a vehicle drives beside the centre of its lane. If a trigger refers to the ego,
+//! its time holds for an ego that keeps the speed of the file, as in a nominal encounter: it is the
+//! same for every controller. An element that a scenario cannot express is an error with file, line
+//! and element, or a note; nothing is left out in silence.
 
 mod condition;
 mod course;
@@ -231,8 +231,8 @@ fn check_options(reader: &Reader, root: &Node, options: &ImportOptions) -> Resul
     }
 }
 
-/// Returns the error of the scenario that a file describes at the element that describes its part: the
-/// lines of the scenario file are none of the reader's.
+/// Returns the error of the scenario that a file describes at the element that describes its part:
+/// the lines of the scenario file are none of the reader's.
 fn at_element(reader: &Reader, (root, vehicles): (&Node, &[Vehicle]), error: ScenarioError) -> ImportFailure {
     let ScenarioError::Value { source, .. } = &error else {
         return ImportFailure::Scenario { path: reader.path.clone(), source: Box::new(error) };
@@ -268,7 +268,8 @@ fn check_kind(reader: &Reader, root: &Node) -> Result<(), ImportError> {
     }
 }
 
-/// Name of the property in the header of a logical scenario that has the hash of all other elements.
+/// Name of the property in the header of a logical scenario that has the hash of all other
+/// elements.
 pub const CONTENT_PROPERTY: &str = "closecall-content";
 
 /// Returns the hash of the elements of a document without its header; `None` if it is no XML.
@@ -276,9 +277,9 @@ pub fn content_hash(text: &str) -> Option<String> {
     Some(parse(Path::new(""), text).ok()?.content_hash())
 }
 
-/// Returns the scenario that Closecall wrote into the header of a logical scenario, with the values of
-/// the options in place of its parameters. The distributions of another file, whose path stands with
-/// them, replace the distributions of its parameters.
+/// Returns the scenario that Closecall wrote into the header of a logical scenario, with the values
+/// of the options in place of its parameters. The distributions of another file, whose path stands
+/// with them, replace the distributions of its parameters.
 ///
 /// # Errors
 /// [`ImportFailure`] if the other elements are not those that were written with it, or an option or

@@ -1,4 +1,5 @@
-//! A vehicle that drives beside the centre of its lane: `LaneOffsetAction`, and the `offset` of a start.
+//! A vehicle that drives beside the centre of its lane: `LaneOffsetAction`, and the `offset` of a
+//! start.
 //!
 //! ```text
 //!  offset of the start, actions ─▶ offset at each time, as played ─▶ distance since the start and lateral position
@@ -26,8 +27,8 @@ use super::storyboard::{STEP_S, Storyboard};
 
 /// Steps of the storyboard from one point of a path to the next: 0.25 s.
 const STEPS_PER_POINT: usize = 25;
-/// Least distance between two points of a path (m): in the time of a point, the distance at 2 m/s. A
-/// vehicle that is slower cannot shift as the action says. An assumption; 0.1 to 1 are plausible.
+/// Least distance between two points of a path (m): in the time of a point, the distance at 2 m/s.
+/// A vehicle that is slower cannot shift as the action says. An assumption; 0.1 to 1 are plausible.
 const LEAST_STEP_M: f64 = 0.5;
 /// Distance to the second point of a path whose offset does not change (m): any distance gives the
 /// same path.
@@ -48,8 +49,8 @@ impl Storyboard<'_> {
         }
     }
 
-    /// Returns the lane in which a place beside the centre of a lane (m) lies, and its offset from the
-    /// centre of that lane (m).
+    /// Returns the lane in which a place beside the centre of a lane (m) lies, and its offset from
+    /// the centre of that lane (m).
     ///
     /// # Errors
     /// [`ImportError`] if it lies beside the driving lanes.
@@ -122,8 +123,8 @@ impl Storyboard<'_> {
         Ok(Shift { vehicle, line: node.line, from_m, to_m, begins_s: self.time_s, duration_s, is_cubic, is_kept })
     }
 
-    /// Returns the lateral path of a vehicle that starts in a lane with its centre at `centre_m`, or
-    /// `None` if it keeps the centre of its lane.
+    /// Returns the lateral path of a vehicle that starts in a lane with its centre at `centre_m`,
+    /// or `None` if it keeps the centre of its lane.
     ///
     /// # Errors
     /// [`ImportError`] at the action by which a vehicle shifts that hardly moves.
@@ -154,8 +155,8 @@ impl Storyboard<'_> {
     }
 }
 
-/// Returns the points of a path: distance since the start and lateral position (m). Each sample is the
-/// distance and the offset from `centre_m` (m). A part with one offset needs no points inside.
+/// Returns the points of a path: distance since the start and lateral position (m). Each sample is
+/// the distance and the offset from `centre_m` (m). A part with one offset needs no points inside.
 ///
 /// # Errors
 /// The index of the sample in which a vehicle has shifted and has hardly moved ahead.

@@ -3,8 +3,8 @@
 
 use closecall_traffic::{Road, maths};
 
-/// Distance between two places of a line among which the nearest one is searched (m): a road turns by
-/// less than 0.2 rad over it.
+/// Distance between two places of a line among which the nearest one is searched (m): a road turns
+/// by less than 0.2 rad over it.
 const PLACES_M: f64 = 50.0;
 
 /// A position on a road, relative to its reference line.
@@ -42,8 +42,8 @@ impl ReferenceLine {
         RoadPoint { s_m, t_m }
     }
 
-    /// Returns the position of the place of the line that is nearest to a point ahead and to the left of
-    /// its start (m). The places are [`PLACES_M`] apart.
+    /// Returns the position of the place of the line that is nearest to a point ahead and to the
+    /// left of its start (m). The places are [`PLACES_M`] apart.
     fn near_m(&self, ahead_m: f64, left_m: f64) -> f64 {
         let (mut nearest, mut at_m) = ((f64::INFINITY, 0.0), 0.0);
         while at_m <= self.length_m {

@@ -17,8 +17,8 @@ const REPLACED: [&str; 8] =
 const SAME: f64 = 1e-9;
 
 /// Returns the text of a scenario file with the distributions of another file, and notes on what
-/// became of them. A parameter that has the same distribution already keeps its text. `source` names
-/// the other file, for its errors and for the reader of the scenario file.
+/// became of them. A parameter that has the same distribution already keeps its text. `source`
+/// names the other file, for its errors and for the reader of the scenario file.
 ///
 /// # Errors
 /// [`ImportError`] at a distribution whose parameter the scenario does not have, or that no

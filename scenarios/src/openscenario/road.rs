@@ -18,8 +18,8 @@ use super::shape;
 const LANES: std::ops::RangeInclusive<usize> = 1..=8;
 /// Highest speed limit of a scenario file (m/s).
 const MOST_SPEED_LIMIT_MPS: f64 = 100.0;
-/// The words of the standard for no speed limit. Its type `t_maxSpeed` has these words and the numbers
-/// of at least 0: some programs write -1, which has no meaning there.
+/// The words of the standard for no speed limit. Its type `t_maxSpeed` has these words and the
+/// numbers of at least 0: some programs write -1, which has no meaning there.
 const NO_LIMIT: [&str; 2] = ["no limit", "undefined"];
 
 /// The part of a file's road that a scenario can use.
@@ -37,7 +37,8 @@ pub(super) struct ImportedRoad {
     pub(super) curvature_per_m: f64,
     /// The course of a road whose curvature changes, or whose lanes lie beside its reference line.
     pub(super) alignment: Option<Alignment>,
-    /// Lateral position of the reference line of the file: to the left of the left edge of the lanes (m).
+    /// Lateral position of the reference line of the file: to the left of the left edge of the
+    /// lanes (m).
     pub(super) alignment_d_m: f64,
     /// Where along the road the lanes are.
     pub(super) sections: LaneSections,
@@ -52,8 +53,8 @@ pub(super) struct ImportedRoad {
 /// The road that a scenario uses.
 #[derive(Clone, Debug)]
 pub(super) enum UsedRoad<'a> {
-    /// The road of this number; a vehicle uses this lane. A position of the scenario says so, and is
-    /// wrong if there is no such road or lane.
+    /// The road of this number; a vehicle uses this lane. A position of the scenario says so, and
+    /// is wrong if there is no such road or lane.
     Lane { road_id: String, lane: i32, reader: &'a Reader, position: &'a Node },
     /// The only road of the network.
     Only,
@@ -62,8 +63,8 @@ pub(super) enum UsedRoad<'a> {
 /// Reads the road that a scenario uses.
 ///
 /// # Errors
-/// [`ImportError`] if the document is no OpenDRIVE, has a number that no road has, or has no such road
-/// or no such lane.
+/// [`ImportError`] if the document is no OpenDRIVE, has a number that no road has, or has no such
+/// road or no such lane.
 pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<ImportedRoad, ImportError> {
     let root = parse(path, text)?;
     if root.name != "OpenDRIVE" {
@@ -107,7 +108,8 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     let side = if is_left_hand { "left" } else { "right" };
     let entry = entry_lane::find(lanes, side, length_m);
     let sections = LaneSections::read(path, lanes, side);
-    // The place that gives the lanes: the start of a vehicle, or of a road with an acceleration lane.
+    // The place that gives the lanes: the start of a vehicle, or of a road with an acceleration
+    // lane.
     let (section, at_m) = match (used, &entry) {
         (UsedRoad::Lane { reader, position, .. }, None) => {
             let s_m = reader.number(position, "s")?;
@@ -218,7 +220,8 @@ fn start_m(section: &Node) -> f64 {
     value(section, "s")
 }
 
-/// Returns the value at a place of the polynomials of a name (m), whose starts are the attribute `from`.
+/// Returns the value at a place of the polynomials of a name (m), whose starts are the attribute
+/// `from`.
 fn polynomial_m(parent: &Node, (name, from): (&str, &str), at_m: f64) -> f64 {
     let pieces: Vec<&Node> = parent.all(name).collect();
     let last = pieces.iter().rev().find(|piece| value(piece, from) <= at_m).or(pieces.first());
@@ -235,7 +238,8 @@ fn width_m(lane: &Node, within_m: f64) -> f64 {
 }
 
 /// Returns the centres of driving lanes to the left of the reference line (m), from the left.
-/// `along` holds the lanes of one side. The place is given from the start of the road and of the section (m).
+/// `along` holds the lanes of one side. The place is given from the start of the road and of the
+/// section (m).
 fn centres_m(lanes: &Node, along: &Node, (driving, [at_m, within_m]): (&[(i32, f64)], [f64; 2])) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, reason = "as the lanes that they are compared with")]
     let of_lane = |lane: &Node| (value(lane, "id") as i32, width_m(lane, within_m));
@@ -256,8 +260,8 @@ fn centres_m(lanes: &Node, along: &Node, (driving, [at_m, within_m]): (&[(i32, f
     centres_m.into_iter().map(|(_, centre_m)| centre_m).collect()
 }
 
-/// Returns the reference line of a road of a length (m) in the plane, or `None` if it is not the course
-/// of the imported road, or the file does not say where it begins.
+/// Returns the reference line of a road of a length (m) in the plane, or `None` if it is not the
+/// course of the imported road, or the file does not say where it begins.
 fn reference_line(
     path: &Path,
     (road, length_m): (&Node, f64),
@@ -282,9 +286,9 @@ fn reference_line(
     is_followed.then_some(ReferenceLine { x_m, y_m, heading_rad, length_m, course })
 }
 
-/// Returns the curvature of a road of lines, or of one arc at the edge of the lanes; or the alignment of a
-/// road with other pieces. The reference line lies `beside_m` to the left of the lanes. If no alignment
-/// follows the road, returns the curvature of a straight road with a note.
+/// Returns the curvature of a road of lines, or of one arc at the edge of the lanes; or the
+/// alignment of a road with other pieces. The reference line lies `beside_m` to the left of the
+/// lanes. If no alignment follows the road, returns the curvature of a straight road with a note.
 fn curvature(
     path: &Path,
     (road, beside_m): (&Node, f64),

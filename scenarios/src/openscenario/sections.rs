@@ -26,7 +26,8 @@ struct LaneSection {
 pub(super) struct LaneSections(Vec<LaneSection>);
 
 impl LaneSections {
-    /// Reads the lane sections. `side` is the side of the reference line with the lanes along the road.
+    /// Reads the lane sections. `side` is the side of the reference line with the lanes along the
+    /// road.
     pub(super) fn read(path: &Path, lanes: &Node, side: &str) -> Self {
         let section = |node: &Node| {
             let (from_m, lanes) = entry_lane::section(node, side).unwrap_or_default();
@@ -79,7 +80,8 @@ mod tests {
     use super::super::dom::parse;
     use super::*;
 
-    /// The sections of a road, each with its start and its lanes: numbers, or a number and its successor's.
+    /// The sections of a road, each with its start and its lanes: numbers, or a number and its
+    /// successor's.
     fn sections(places: &[(f64, &str)]) -> LaneSections {
         let lane = |lane: &str| {
             let (id, next) = lane.split_once(':').unwrap_or((lane, lane));

@@ -2,8 +2,8 @@
 //! the course and the lanes of the road.
 //!
 //! A number that no road can have is an error of its file, also if a scenario of parallel lanes has
-//! no use for it: the road would not be the one that the file means. Objects, signals, junctions and
-//! the data of other programs are not read.
+//! no use for it: the road would not be the one that the file means. Objects, signals, junctions
+//! and the data of other programs are not read.
 
 use std::path::Path;
 
@@ -11,16 +11,17 @@ use closecall_traffic::maths;
 
 use super::dom::{ImportError, Node, number};
 
-/// Largest curvature of a road (1/m): no car drives through less than 5 m of radius. An assumption; 0.1
-/// to 0.25 are plausible.
+/// Largest curvature of a road (1/m): no car drives through less than 5 m of radius. An assumption;
+/// 0.1 to 0.25 are plausible.
 const MOST_CURVATURE_PER_M: f64 = 0.2;
-/// Largest coordinate in the plane (m): the circumference of the earth, which no projection exceeds.
+/// Largest coordinate in the plane (m): the circumference of the earth, which no projection
+/// exceeds.
 const MOST_COORDINATE_M: f64 = 4.1e7;
 /// Largest heading (rad): some programs add up the turns of a road. An assumption; 7 to 1000 are
 /// plausible.
 const MOST_HEADING_RAD: f64 = 100.0;
-/// Heights of a road (m): below the Dead Sea, and above each pass. An assumption; -11,000 to 9000 are
-/// the heights of the earth's surface.
+/// Heights of a road (m): below the Dead Sea, and above each pass. An assumption; -11,000 to 9000
+/// are the heights of the earth's surface.
 const HEIGHT_M: [f64; 2] = [-11_000.0, 9_000.0];
 /// Steepest road (m/m): an assumption; the steepest streets have 0.35.
 const MOST_SLOPE: f64 = 1.0;
@@ -263,8 +264,8 @@ impl Checker<'_> {
         Ok([a?, b?, c?, d?])
     }
 
-    /// Checks the polynomials of one kind: each at its start and where the next one begins. `from` is
-    /// the attribute of its start, and the end of the last one (m).
+    /// Checks the polynomials of one kind: each at its start and where the next one begins. `from`
+    /// is the attribute of its start, and the end of the last one (m).
     fn cubics(&self, parent: &Node, name: &str, from: (&str, f64), limits: &Limits) -> Result<(), ImportError> {
         let pieces: Vec<&Node> = parent.all(name).collect();
         let mut starts_m = Vec::with_capacity(pieces.len());

@@ -11,8 +11,8 @@
 //! A `Range` truncates a distribution. The expected value and the variance are the ones before
 //! truncation. For a log-normal distribution, they belong to the value itself, and not to its
 //! logarithm: σ² = ln(1 + v / m²), and the median is m / √(1 + v / m²), for the expected value m
-//! and the variance v. `tool export` writes them in the same way. The schema of the standard has the
-//! same two attributes as for a normal distribution.
+//! and the variance v. `tool export` writes them in the same way. The schema of the standard has
+//! the same two attributes as for a normal distribution.
 
 use std::collections::BTreeMap;
 
@@ -141,8 +141,8 @@ fn fixed(value: &str, is_label: bool) -> Result<Value, String> {
     }
 }
 
-/// Returns the index of the weight in which a number `u` in [0, 1) falls, and its place in it, from 0
-/// to 1.
+/// Returns the index of the weight in which a number `u` in [0, 1) falls, and its place in it, from
+/// 0 to 1.
 fn chosen(weights: &[f64], u: f64) -> (usize, f64) {
     let mut rest = u * weights.iter().sum::<f64>();
     for (index, weight) in weights.iter().enumerate() {
@@ -155,8 +155,8 @@ fn chosen(weights: &[f64], u: f64) -> (usize, f64) {
     (weights.iter().rposition(|weight| *weight > 0.0).unwrap_or_default(), 1.0)
 }
 
-/// Returns the quantiles at equally spaced probabilities of a histogram: each bin is divided into as
-/// many equal parts as its weight has shares.
+/// Returns the quantiles at equally spaced probabilities of a histogram: each bin is divided into
+/// as many equal parts as its weight has shares.
 fn quantiles(bins: &[[f64; 2]], weights: &[f64]) -> Result<Vec<f64>, String> {
     let used: Vec<_> = bins.iter().zip(weights).filter(|(_, weight)| **weight > 0.0).collect();
     if let Some(pair) = used.windows(2).find(|pair| pair[0].0[1] != pair[1].0[0]) {

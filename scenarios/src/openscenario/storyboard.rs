@@ -19,7 +19,8 @@ use super::world::Vehicle;
 
 /// Step of the storyboard (s): the step of esmini's tests.
 pub(super) const STEP_S: f64 = 0.01;
-/// Longest storyboard without a stop trigger that fires (s): an assumption; 100 to 1000 are plausible.
+/// Longest storyboard without a stop trigger that fires (s): an assumption; 100 to 1000 are
+/// plausible.
 pub(super) const LONGEST_S: f64 = 300.0;
 /// Time that is played after the last action ended (s), if no trigger stops the storyboard: an
 /// assumption; 5 to 60 are plausible.
@@ -122,7 +123,8 @@ pub(super) struct Storyboard<'a> {
     done: BTreeSet<usize>,
     /// Time and speed of each vehicle in each step.
     pub(super) speeds: Vec<Vec<(f64, f64)>>,
-    /// Distance since the start and offset from the centre of the lane of each vehicle in each step (m).
+    /// Distance since the start and offset from the centre of the lane of each vehicle in each step
+    /// (m).
     pub(super) offsets: Vec<Vec<[f64; 2]>>,
     pub(super) shifts: Vec<Shift>,
     pub(super) lane_changes: Vec<LaneChange>,
@@ -759,8 +761,8 @@ impl<'a> Storyboard<'a> {
         }
     }
 
-    /// Notes an action that ends before it is done, if the scenario file cannot say so. Lane changes
-    /// of a trajectory that have not begun do not happen.
+    /// Notes an action that ends before it is done, if the scenario file cannot say so. Lane
+    /// changes of a trajectory that have not begun do not happen.
     fn cut_short(&mut self, event: &str, action: &Running) {
         let time_s = self.time_s;
         match *action {

@@ -21,8 +21,8 @@ use super::storyboard::{LONGEST_S, MOST_SPEED_MPS, STEP_S, Storyboard};
 /// Accelerations that a prescribed driver commands (m/s²): `MAX_BRAKING_MPS2` and
 /// `MAX_ACCELERATION_MPS2` of its module.
 pub(super) const ACCELERATION_MPS2: [f64; 2] = [-9.0, 5.0];
-/// Largest distance between a master and its target at the time of its arrival, beside the tolerance
-/// of the action (m): an assumption; 0.01 to 1 are plausible.
+/// Largest distance between a master and its target at the time of its arrival, beside the
+/// tolerance of the action (m): an assumption; 0.01 to 1 are plausible.
 const MOST_APART_M: f64 = 0.1;
 /// Difference of two times or speeds that are the same but for rounding: numerical.
 const SAME: f64 = 1e-9;
@@ -119,7 +119,8 @@ impl Approach {
 }
 
 impl Storyboard<'_> {
-    /// Returns the speeds at times by which a vehicle arrives together with another, and notes them.
+    /// Returns the speeds at times by which a vehicle arrives together with another, and notes
+    /// them.
     ///
     /// # Errors
     /// [`ImportError`] if a vehicle of a scenario cannot arrive in time, or if the arrival of the

@@ -5,16 +5,16 @@
 //!                                                └─▶ nearest lane of each ─▶ lane changes
 //! ```
 //!
-//! A vehicle of a scenario keeps the centre of its lane, and changes lanes on a path of its own. A lane
-//! change replaces a part of the trajectory. It takes the same time from 10 % to 90 % of the way between
-//! the two centres.
+//! A vehicle of a scenario keeps the centre of its lane, and changes lanes on a path of its own. A
+//! lane change replaces a part of the trajectory. It takes the same time from 10 % to 90 % of the
+//! way between the two centres.
 
 use super::dom::{ImportError, Node};
 use super::plane::{RoadPoint, nearest};
 use super::storyboard::{LaneChange, MOST_SPEED_MPS, STEP_S, Storyboard};
 
-/// Share of the duration of a lane change that passes between 10 % and 90 % of the way, on the quintic
-/// path 10 x³ − 15 x⁴ + 6 x⁵ of a scenario.
+/// Share of the duration of a lane change that passes between 10 % and 90 % of the way, on the
+/// quintic path 10 x³ − 15 x⁴ + 6 x⁵ of a scenario.
 const MIDDLE_SHARE: f64 = 0.506_72;
 /// Share of the way between two lanes at which a lane change is taken to have begun; its complement
 /// is the end. An assumption; 0.05 to 0.2 are plausible.
