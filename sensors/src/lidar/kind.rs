@@ -2,8 +2,8 @@
 //! each.
 //!
 //! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its
-//! `model`, or a file of its own by `pattern-file`. A LiDAR that does not scan a raster has a table of
-//! beams in place of layers and columns ([`super::beam_table`]).
+//! `model`, or a file of its own by `pattern-file`. A LiDAR that does not scan a raster has a table
+//! of beams in place of layers and columns ([`super::beam_table`]).
 //!
 //! The range of a target of reflectivity ρ that fills the beam follows from one published range R
 //! at the reflectivity ρ₀, which the sensor reaches with the probability p: the received power is

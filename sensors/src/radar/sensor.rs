@@ -93,7 +93,8 @@ pub(crate) struct RearRadars {
     dead_scans: [u32; 2],
     /// Numbers of latest successive scans whose time stamps show that they have arrived late.
     late_scans: [u32; 2],
-    /// Whether dirt and rain leave so little of the range that the monitors of the radars report it.
+    /// Whether dirt and rain leave so little of the range that the monitors of the radars report
+    /// it.
     are_short: [bool; 2],
 }
 
@@ -339,8 +340,8 @@ impl RearRadars {
     }
 
     /// Calls `use_scan` with each scan that the tracker may have in `step`, in the order of their
-    /// times, up to the time `before`, which is excluded. Scans of both radars of the same time that
-    /// arrive in the same step are one.
+    /// times, up to the time `before`, which is excluded. Scans of both radars of the same time
+    /// that arrive in the same step are one.
     ///
     /// A scan is late if it arrives more than a period after its usual step.
     pub(crate) fn pass_due(&mut self, step: u64, before: Option<Time>, mut use_scan: impl FnMut(&RadarScan<'_>)) {
@@ -548,7 +549,8 @@ mod tests {
     #[test]
     fn rain_shortens_the_range_and_only_the_range() {
         let road = Road::straight(3);
-        // The car is 45 m away. The range of 50 m falls to 48 m at 10 mm/h, and to 40 m at 200 mm/h.
+        // The car is 45 m away. The range of 50 m falls to 48 m at 10 mm/h, and to 40 m at 200
+        // mm/h.
         let in_rain = |rain_mm_per_h: f64, range_m: u32| {
             let text = format!("detection-probability = 1.0\nrange-m = {range_m}");
             let mut pair = radars(&text, 1);
