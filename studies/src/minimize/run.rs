@@ -31,8 +31,8 @@ pub struct Offset {
     pub nominal: String,
     /// The value in words, with its unit.
     pub words: String,
-    /// How far the value is from the nominal one, with sign (standard deviations); `None` of a value
-    /// that the distribution never takes.
+    /// How far the value is from the nominal one, with sign (standard deviations); `None` of a
+    /// value that the distribution never takes.
     pub distance_sd: Option<f64>,
     /// How far the value is from the nominal one, with sign, in the parameter's unit; `None` of a
     /// label.
