@@ -27,8 +27,9 @@
 //!
 //! **Doubts.** The lanes on the derived road are compared with the lane changes that the file states;
 //! see `lane_comparison`. A result is in doubt if they disagree, if vehicles of one lane are spread
-//! over more than a lane, if fewer than 15 vehicles show a bent road without names of lanes, or if the
-//! indices grow to the right although the layouts count from there.
+//! over more than a lane, if fewer than 15 vehicles show a bent road without names of lanes, if fewer than
+//! three show parts of it that hold more than 5 % of the rows, or if the indices grow to the right although
+//! the layouts count from there.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,7 +44,7 @@ use super::markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 use super::reference_line::{Point, Projection, ReferenceLine};
 use super::road_axis::{AXIS_SECTION_M, Departures, LateralFit, LateralPositions};
 use super::stated_lanes::{LaneObserver, LaneRow, StatedLane, Strand, Strands};
-use super::unnamed_lanes::{Movements, axis, lane_width_m};
+use super::unnamed_lanes::{LEAST_MOVING, Movements, axis, lane_width_m};
 
 /// Lane width if the traffic gives none (m).
 const FALLBACK_LANE_WIDTH_M: f64 = DEFAULT_LANE_WIDTH_M;
@@ -335,11 +336,19 @@ impl InferredRoad {
         &mut self,
         each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
     ) -> Result<(), E> {
-        for _ in 0..AXIS_TURNS {
+        self.directions.iter_mut().for_each(|direction| direction.line = direction.line.with_steady_ends());
+        for turn in 0..=AXIS_TURNS {
             let mut movements = vec![Movements::default(); self.directions.len()];
             self.each_following(each_row, |direction, vehicle, projection| {
                 movements[direction].add(vehicle, projection);
             })?;
+            if turn == AXIS_TURNS {
+                // A straight line goes on where few vehicles drive.
+                let bent = self.directions.iter().zip(&movements).filter(|(road, _)| road.line.bend_m() > STRAIGHT_M);
+                let unknown = bent.map(|(_, movements)| movements.unknown_share()).fold(0.0, f64::max);
+                self.doubts.extend((unknown > WARNED_SHARE).then(|| doubt_of_sections(unknown)));
+                break;
+            }
             for (direction, movements) in self.directions.iter_mut().zip(movements) {
                 direction.line = movements.departures().moved(&direction.line, 0.0);
             }
@@ -649,6 +658,15 @@ fn smoothed(points: &[Point]) -> Vec<Point> {
     let once = average(points);
     let twice = average(&once);
     once.iter().zip(&twice).map(|(once, twice)| (2.0 * once.0 - twice.0, 2.0 * once.1 - twice.1)).collect()
+}
+
+/// Returns the doubt about a road in parts of which too few vehicles show how it goes on.
+fn doubt_of_sections(unknown: f64) -> String {
+    format!(
+        "the file names no lanes, and {:.0} % of its rows are where fewer than {LEAST_MOVING} vehicles show whether the road bends or a \
+         vehicle changes lanes: lane changes there may be wrong or missing",
+        100.0 * unknown
+    )
 }
 
 /// Returns the section of the road at `s_m`.

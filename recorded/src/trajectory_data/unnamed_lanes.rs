@@ -7,14 +7,17 @@
 //!   3. axis          as for named lanes, with the lanes of step 2
 //! ```
 //!
-//! 1. The first line follows the path of one vehicle, and continues straight beyond its ends. The median
-//!    movement of all vehicles from section to section shows how it departs from the axis. A vehicle
-//!    that changes lanes is an outlier. Medians add up along the road, so that errors do, too: 0.1 m in
+//! 1. The first line follows the path of one vehicle, and continues straight beyond its ends, in the mean
+//!    direction of the last 40 m. The median movement of all vehicles from section to section shows how it
+//!    departs from the axis. A vehicle that changes lanes is an outlier. Medians add up along the road, so that errors do, too: 0.1 m in
 //!    each section are 0.5 m after 500 m, less than half a lane.
 //! 2. The period of the lateral positions is the lane width; see `estimated_lanes`. It shows in which
 //!    lane each position is.
 //! 3. With these lanes, each section is compared with the whole road; see `road_axis`. Errors
 //!    then do not add up.
+//!
+//! Where one or two vehicles are recorded, their rows do not show whether the road bends or they change lanes.
+//! The line continues straight there. If it bends elsewhere, and many rows are there, a result is in doubt.
 //!
 //! If few vehicles are recorded, or no lane width stands out, or all vehicles are in one lane, the road
 //! ends with step 1.
@@ -33,9 +36,9 @@ use super::road_axis::{Departures, LateralPositions};
 /// pass several. An assumption with a plausible range of 10 to 40 m.
 const SECTION_M: f64 = 20.0;
 
-/// Least number of vehicles that show a movement: if drivers move by 0.1 m within 20 m, the median of five is
-/// accurate to 0.06 m. Two of the five may change lanes. An assumption with a plausible range of 5 to 10.
-const LEAST_MOVING: usize = 5;
+/// Least number of vehicles that show a movement: the median of three holds if one of them changes lanes, and the
+/// median of two does not. If drivers move by 0.1 m within 20 m, the median of three is accurate to 0.07 m.
+pub(super) const LEAST_MOVING: usize = 3;
 
 /// Least share of the positions that a lane holds (-), as in `inferred_road`.
 const LEAST_SHARE: f64 = 0.02;
@@ -45,6 +48,8 @@ const LEAST_SHARE: f64 = 0.02;
 pub(super) struct Movements {
     /// Movements to the left from the start of the section before to the start of the section (m).
     sections: BTreeMap<i64, Vec<f64>>,
+    /// Number of rows in each section.
+    rows: BTreeMap<i64, u64>,
     latest: Option<Visit>,
 }
 
@@ -64,6 +69,7 @@ impl Movements {
     pub(super) fn add(&mut self, vehicle: u64, projection: &Projection) {
         #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates")]
         let section = (projection.s_m / SECTION_M).floor() as i64;
+        *self.rows.entry(section).or_default() += 1;
         let before = self.latest.filter(|before| before.vehicle == vehicle);
         if before.is_some_and(|before| before.section == section) {
             return;
@@ -73,6 +79,15 @@ impl Movements {
             self.sections.entry(section).or_default().push(projection.d_m - before.d_m);
         }
         self.latest = Some(Visit { vehicle, section, d_m: projection.d_m, is_whole: before.is_some() });
+    }
+
+    /// Returns the share of the rows in sections in which too few vehicles show how the road goes on, neither
+    /// from the section before nor to the section behind (-).
+    pub(super) fn unknown_share(&self) -> f64 {
+        let is_shown = |section: i64| self.sections.get(&section).is_some_and(|moved| moved.len() >= LEAST_MOVING);
+        let unknown = self.rows.iter().filter(|(section, _)| !is_shown(**section) && !is_shown(**section + 1));
+        let (unknown, all): (u64, u64) = (unknown.map(|(_, rows)| rows).sum(), self.rows.values().sum());
+        if all > 0 { unknown as f64 / all as f64 } else { 0.0 }
     }
 
     /// Returns the departures of the line from the axis, about a median of 0. Without enough vehicles, a section
@@ -201,9 +216,10 @@ mod tests {
     fn few_vehicles_move_no_line_and_a_single_lane_shows_no_width() {
         let line = ReferenceLine::through([(0.0, 0.0), (100.0, 1.0)].into_iter());
         let mut movements = Movements::default();
-        for vehicle in 0..4 {
+        for vehicle in 0..2 {
             (0..50_u32).for_each(|k| movements.add(vehicle, &line.project((2.0 * f64::from(k), 0.0))));
         }
+        assert_eq!(movements.unknown_share(), 1.0);
         assert!(movements.departures().is_empty());
         let mut positions = LateralPositions::new(AXIS_SECTION_M);
         for vehicle in 0..40_u64 {
