@@ -12,7 +12,8 @@
 //!    resultant R = |Σ exp(2πi·d/w)| / n (the Rayleigh statistic of circular data; K. V. Mardia, P. E.
 //!    Jupp, *Directional Statistics*, 2000, section 6.3). Lanes of motorways are 3.25 to 3.75 m wide
 //!    (RAA 2008), those of US interstates 3.66 m, and NGSIM's 3.4 m.
-//! 2. Within each period, the mode of the density is where vehicles drive.
+//! 2. Within each period, the mode of the density is where vehicles drive. An empty lane between two others has
+//!    its mode between theirs.
 //! 3. A marking lies halfway between two modes. Drivers keep off the middle of their lanes by a
 //!    common distance. If the modes lie near the middles of lanes that begin at d = 0, the left edge
 //!    of lane 1 by the definition of the layouts, the markings are shifted back by it.
@@ -180,10 +181,13 @@ impl Period {
     }
 }
 
-/// Returns the mode of each lane that holds vehicles, from left to right (m, to the right).
+/// Returns the mode of each lane that holds vehicles, or lies between lanes that do, from left to right (m, to the
+/// right).
 fn modes(right_m: &[f64], width_m: f64, phase_m: f64) -> Vec<f64> {
     let (least_m, most_m) = (right_m[0], right_m[right_m.len() - 1]);
-    let mut modes = Vec::new();
+    let mut modes: Vec<f64> = Vec::new();
+    // Number of empty lanes to the right of the last mode.
+    let mut empty = 0_u32;
     let mut middle_m = phase_m + width_m * ((least_m - phase_m) / width_m).floor();
     while middle_m <= most_m + 0.5 * width_m {
         let within = |from_m: f64, to_m: f64| {
@@ -199,7 +203,14 @@ fn modes(right_m: &[f64], width_m: f64, phase_m: f64) -> Vec<f64> {
                 near.iter().map(|d| maths::exp(-0.5 * ((d - at_m) / BANDWIDTH_M).powi(2))).sum()
             };
             let mode = (0..=steps).map(|step| (density(at(step)), at(step))).max_by(|a, b| a.0.total_cmp(&b.0));
-            modes.extend(mode.map(|(_, at_m)| at_m));
+            if let (Some(left_m), Some((_, mode_m))) = (modes.last().copied(), mode) {
+                let step_m = (mode_m - left_m) / f64::from(empty + 1);
+                modes.extend((1..=empty).map(|lane| left_m + step_m * f64::from(lane)));
+            }
+            modes.extend(mode.map(|(_, mode_m)| mode_m));
+            empty = 0;
+        } else {
+            empty += 1;
         }
         middle_m += width_m;
     }

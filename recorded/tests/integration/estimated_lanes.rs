@@ -124,6 +124,17 @@ fn a_road_that_does_not_begin_at_zero_has_its_lanes_where_its_vehicles_drive() {
 }
 
 #[test]
+fn an_empty_lane_between_others_is_counted() {
+    // Lane 2 has no vehicle but the ones that change to it.
+    let mut vehicles: Vec<Lateral> =
+        (0..24_u32).map(|n| keeps(LANE_M * (2.0 * f64::from(n % 2) + 0.7), 0.25, 0.37 * f64::from(n))).collect();
+    vehicles.push(changes(2.0, 0.0));
+    let data = read_without_lanes(&vehicles);
+    let changes = listed(&detect(&smooth(&data)));
+    assert_eq!(changes, [(25, Side::Left, 3, 2), (25, Side::Left, 2, 1)], "{:?}", data.markings);
+}
+
+#[test]
 fn a_vehicle_that_sways_in_its_lane_or_about_a_marking_changes_no_lane() {
     let mut vehicles = traffic(0.0);
     // By 1.2 m about the middle of its lane, and by 0.4 m about a marking.
