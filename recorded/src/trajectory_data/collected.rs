@@ -471,7 +471,9 @@ fn exchanges(jumps: &mut [LaneJump]) -> Vec<usize> {
     exchanged
 }
 
-fn is_lane_jump(before: &Row, row: &Row) -> bool {
+/// Returns true if a vehicle changes its lane within the step from `before` to `row`, and not by driving across the
+/// marking.
+pub(super) fn is_lane_jump(before: &Row, row: &Row) -> bool {
     let (across_m, step_s) = ((row.d_m - before.d_m).abs(), (row.time - before.time).s());
     before.lane != row.lane && across_m > JUMP_M.max(JUMP_MPS * step_s).min(0.9 * 2.0 * JUMP_M)
 }

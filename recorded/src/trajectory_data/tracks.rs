@@ -8,6 +8,7 @@ use closecall_traffic::Time;
 use super::axes::{self, Axes, AxisOptions};
 use super::builder::TrackBuilder;
 use super::class_names::UnknownClass;
+use super::collected::is_lane_jump;
 use super::continuity::{Continuity, FrameClock};
 use super::data::{RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
@@ -148,6 +149,8 @@ pub struct Tracks<'a> {
     speed_doubt: Option<String>,
     /// `true` if the file is of a simulation, in which a lane change may take a single step.
     is_simulated: bool,
+    /// `true` if it changes lanes in single steps, which no distance between frames hides.
+    jumps_to_lanes: bool,
     lanes: LaneReliability,
     /// The lanes that are estimated from the traffic, or the reason why they cannot be.
     estimated: Option<Result<EstimatedLanes, String>>,
@@ -192,6 +195,7 @@ impl<'a> Tracks<'a> {
             lane_doubt: None,
             speed_doubt: None,
             is_simulated: false,
+            jumps_to_lanes: false,
             lanes: options.lanes,
             estimated: None,
             builder,
@@ -226,7 +230,14 @@ impl<'a> Tracks<'a> {
 
     /// Returns `true` if the frames are too far apart for every lane change to be found.
     fn is_coarse(&self) -> bool {
-        !self.is_simulated && self.period > LONGEST_PERIOD
+        !self.jumps_to_lanes && self.mean_period() > LONGEST_PERIOD
+    }
+
+    /// Returns the mean time between two rows of a vehicle, without the frames that bridge gaps.
+    fn mean_period(&self) -> Time {
+        let bridged = self.builder.continuity().bridged_frames;
+        let share = if self.rows > 0 { bridged as f64 / self.rows as f64 } else { 0.0 };
+        self.period + Time::from_s(share * self.period.s())
     }
 
     /// Returns `true` if the file is of a simulation, in which a lane change may take a single step.
@@ -316,7 +327,7 @@ impl<'a> Tracks<'a> {
                  located at half of the shift"
             )
         });
-        let coarse = self.is_coarse().then(|| coarse_frames(self.period));
+        let coarse = self.is_coarse().then(|| coarse_frames(self.mean_period()));
         let doubts = self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).cloned();
         let notes = self.source.warnings().into_iter().chain(doubts);
         notes.chain(coarse).chain(unknown_lanes).collect()
@@ -513,6 +524,7 @@ impl<'a> Tracks<'a> {
             self.axis_warning = axes::check_markings(beginning, markings)?;
         }
         self.is_simulated = beginning.first().is_some_and(|row| row.clock == Clock::Simulated);
+        self.jumps_to_lanes = self.is_simulated && jump_to_lanes(beginning);
         // The log of one vehicle shows no lanes of a road.
         if self.lanes == LaneReliability::Unreliable && self.source.info().layout != Layout::InCar {
             self.estimated = Some(EstimatedLanes::of(&rows[..rows.len().min(WINDOW_ROWS)]));
@@ -609,6 +621,20 @@ fn is_most(bad: u64, rows: u64) -> bool {
 fn of_most_rows(first: ReadError, bad: u64, rows: u64) -> ReadError {
     let ReadError { line, column, problem } = first;
     ReadError { line, column, problem: TrajectoryFileProblem::MostRows { first: Box::new(problem), bad, rows } }
+}
+
+/// Returns true if most changes of the lane take a single step, as in a simulation that does not model the movement.
+fn jump_to_lanes(rows: &[Row]) -> bool {
+    let mut latest: BTreeMap<u64, &Row> = BTreeMap::new();
+    let (mut changes, mut jumps) = (0_u64, 0_u64);
+    for row in rows {
+        let before = latest.insert(row.number, row);
+        if let Some(before) = before.filter(|before| before.lane != row.lane) {
+            changes += 1;
+            jumps += u64::from(is_lane_jump(before, row));
+        }
+    }
+    2 * jumps > changes
 }
 
 /// Returns the warning for frames that are too far apart.

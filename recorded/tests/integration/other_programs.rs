@@ -196,6 +196,40 @@ fn a_lane_change_in_a_single_step_of_sumo_is_one_and_its_duration_is_named_as_me
     assert!(tracks[1].points.windows(2).any(|pair| pair[0].lane != pair[1].lane));
 }
 
+#[test]
+fn a_simulation_that_models_the_movement_is_in_doubt_if_its_frames_are_far_apart() {
+    // Every fourth time step, 0.4 s apart.
+    let coarse = |jumps: bool| {
+        let text = sumo_xml(jumps);
+        let (head, steps) = text.split_once("<timestep").unwrap();
+        let kept: Vec<&str> = steps.trim_end_matches("</fcd-export>\n").split("<timestep").step_by(4).collect();
+        let data = read_text(format!("{head}<timestep{}</fcd-export>\n", kept.join("<timestep")).as_bytes()).unwrap();
+        let is_named = data.warnings().iter().any(|warning| warning.contains("a row only every 0.40 s"));
+        (data.is_in_doubt, is_named)
+    };
+    assert_eq!(coarse(false), (true, true));
+    // Between no two frames is a lane change of a single step lost.
+    assert_eq!(coarse(true), (false, false));
+}
+
+#[test]
+fn rows_whose_numbers_follow_one_another_are_far_apart_by_their_times() {
+    let header = "Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_Length,v_Width,v_Class,\
+                  v_Vel,v_Acc,Lane_ID,Preceding,Following,Space_Headway,Time_Headway";
+    let doubt = |step_ms: i64| {
+        let mut text = header.to_owned() + "\n";
+        for frame in 1..40 {
+            let (time_ms, along_ft) = (1_118_846_980_000 + step_ms * frame, 100 + step_ms * frame / 20);
+            writeln!(text, "7,{frame},40,{time_ms},20.0,{along_ft},0,0,15.0,6.0,2,50.0,0.0,2,0,0,0.0,0.0").unwrap();
+        }
+        let data = read_text(text.as_bytes()).unwrap();
+        let is_named = data.warnings().iter().any(|warning| warning.contains("there is a row only every 0.3"));
+        (data.is_in_doubt, is_named)
+    };
+    assert_eq!([100, 200, 300].map(doubt), [(false, false); 3]);
+    assert_eq!(doubt(400), (true, true));
+}
+
 /// Fifteen vehicles that weave within three lanes of different widths, and a sixteenth that changes
 /// lanes: name, lane, seconds, position along the road, to the left and lane at that time.
 fn weaving(mut visit: impl FnMut(u32, f64, f64, f64, usize)) {
