@@ -429,6 +429,13 @@ fn a_library_can_create_no_controller() {
         let failure = record.arms[1].result.clone().unwrap_err();
         assert!(failure.message.contains("the library created no controller: no licence"), "{}", failure.message);
     }
+    // A library that says nothing is told where a text belongs.
+    let silent = text.lines().filter(|line| !line.contains("_error(")).collect::<Vec<_>>().join("\n");
+    std::fs::write(&source, silent).unwrap();
+    let library = compile(source.to_str().unwrap(), &folder.path().join("silent.so"), &[]);
+    let output = campaign(&lib(&library), &folder.path().join("silent"), "1", None, &[]);
+    let expected = "the library created no controller; a text of `closecall_controller_error` would say why";
+    assert!(stdout(&output, 5).contains(expected), "{}", stderr(&output));
 }
 
 #[test]

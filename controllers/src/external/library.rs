@@ -145,7 +145,7 @@ impl Library {
     fn reason(&self, controller: *mut c_void) -> String {
         // SAFETY: the controller is null, or lives.
         let stated = self.error.and_then(|error| unsafe { text(foreign_call(ERROR, || error(controller))) });
-        stated.map(|stated| format!(": {stated}")).unwrap_or_default()
+        stated.map_or_else(|| format!("; a text of `{ERROR}` would say why"), |stated| format!(": {stated}"))
     }
 }
 

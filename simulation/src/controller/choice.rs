@@ -1,5 +1,6 @@
 //! The choice of a controller on a command line or in a manifest.
 
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
@@ -247,7 +248,9 @@ pub enum UnknownController {
         text: String,
     },
     /// A `lib:PATH` or `fmu:PATH` names no file.
-    #[error("`{text}` names no file: a path follows the colon, as in `lib:./my_controller.so`")]
+    #[error(
+        "`{text}` names no file: a path follows the colon, as in `lib:./my_controller.so` or `fmu:./my_controller.fmu`"
+    )]
     Path {
         /// The text.
         text: String,
@@ -304,10 +307,28 @@ impl FromStr for ControllerChoice {
                 .map_err(|()| UnknownController::Gap { text: text.to_owned() }),
             None => {
                 let word = text.split(':').next().unwrap_or_default();
-                Err(UnknownController::Name { text: text.to_owned(), hint: hint(word, WORDS) })
+                let hint = without_prefix(text).unwrap_or_else(|| hint(word, WORDS));
+                Err(UnknownController::Name { text: text.to_owned(), hint })
             }
         }
     }
+}
+
+/// Returns the suggestion for a file or a command without the prefix that says what it is.
+fn without_prefix(text: &str) -> Option<String> {
+    if text.contains(':') {
+        return None;
+    }
+    let is_command = text.split_whitespace().nth(1).is_some();
+    let prefix = match Path::new(text).extension().and_then(OsStr::to_str) {
+        _ if is_command => "exec:",
+        Some("so" | "dylib" | "dll") => "lib:",
+        Some("fmu") => "fmu:",
+        Some("py") => "exec:python3 ",
+        _ if text.contains('/') => "exec:",
+        _ => return None,
+    };
+    Some(format!("; did you mean `{prefix}{text}`?"))
 }
 
 /// The form in a manifest: the name of a built-in or hosted controller, or the settings of a
@@ -416,6 +437,17 @@ mod tests {
         let refusal = |text: &str| text.parse::<ControllerChoice>().unwrap_err().to_string();
         assert!(refusal("miss").ends_with("; did you mean `mis`?"), "{}", refusal("miss"));
         assert!(refusal("exce:python3 a.py").ends_with("; did you mean `exec`?"));
+        for (text, meant) in [
+            ("./a.so", "lib:./a.so"),
+            ("a.fmu", "fmu:a.fmu"),
+            ("a.py", "exec:python3 a.py"),
+            ("python3 a.py", "exec:python3 a.py"),
+            ("./a", "exec:./a"),
+        ] {
+            assert!(refusal(text).ends_with(&format!("; did you mean `{meant}`?")), "{}", refusal(text));
+            meant.parse::<ControllerChoice>().unwrap();
+        }
+        assert!(!refusal("a").contains("did you mean `exec"), "{}", refusal("a"));
         assert!(refusal("r157-drivr").ends_with("; did you mean `r157-driver`?"));
         assert!(refusal("gap-3.0").contains("0.8 to 2.5 s in steps of 0.1 s"));
         assert!(refusal("acc+abs").contains("`acc+aeb`"), "{}", refusal("acc+abs"));

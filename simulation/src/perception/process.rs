@@ -15,7 +15,9 @@ use closecall_traffic::{CONTROL_STEP, Time};
 use super::answer::{self, AnswerError, Kind};
 use super::hosted;
 use super::question::{self, Setup};
-use crate::controller::exec::{Child, ExecError, ExecSettings, Identity, START_TIMEOUT, check_hello};
+use crate::controller::exec::{
+    ANSWERS_ALONE, Child, ExecError, ExecSettings, Identity, START_TIMEOUT, check_hello, is_other_text,
+};
 use crate::controller::native::{self, LOAD_TIMEOUT, NativeError, Probe};
 use crate::run::ComputingTime;
 
@@ -49,6 +51,9 @@ impl ProgramError {
         match (kind, self) {
             (ProgramKind::Exec, Self::Process(error)) => {
                 error.advice().map_or_else(|| error.to_string(), |advice| format!("{error}; {advice}"))
+            }
+            (ProgramKind::Exec, Self::Answer(error @ AnswerError::NotJson { line, .. })) if is_other_text(line) => {
+                format!("{error}; {ANSWERS_ALONE}")
             }
             (ProgramKind::Exec, _) | (_, Self::Slow(_) | Self::Stated(_)) => self.to_string(),
             (_, Self::Process(error)) => error.end_of_isolated(WHO).unwrap_or_else(|| error.to_string()),

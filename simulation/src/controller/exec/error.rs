@@ -3,6 +3,9 @@
 use std::io;
 use std::process::ExitStatus;
 
+/// What the author of a process may have missed that writes other text than answers.
+pub(crate) const ANSWERS_ALONE: &str = "standard output is for answers alone, other text belongs on standard error";
+
 /// Why a process did not give a valid answer. The process has been killed, and the sample has no
 /// outcome.
 ///
@@ -152,13 +155,14 @@ impl ExecError {
         matches!(self, Self::Late { .. } | Self::Hangs { .. })
     }
 
-    /// Returns what the author of a process that never answers may have missed; `None` of another
-    /// error.
-    pub const fn advice(&self) -> Option<&'static str> {
+    /// Returns what the author of a process may have missed that never answers, or that writes other
+    /// text than answers; `None` of another error.
+    pub fn advice(&self) -> Option<&'static str> {
         match self {
             Self::Hangs { answered: 0 | 1, .. } => {
                 Some("an answer is one line, which ends with a line feed and is flushed, before the next message comes")
             }
+            Self::NotJson { line, .. } | Self::OutOfTurn { line, .. } if is_other_text(line) => Some(ANSWERS_ALONE),
             _ => None,
         }
     }
@@ -178,6 +182,11 @@ impl ExecError {
             _ => None,
         }
     }
+}
+
+/// Returns true if a line is not even meant as an answer.
+pub(crate) fn is_other_text(line: &str) -> bool {
+    !line.trim_start_matches('\u{feff}').trim_start().starts_with('{')
 }
 
 /// Returns true if a time limit is as long as the limit of a start: whoever exceeds it hangs.

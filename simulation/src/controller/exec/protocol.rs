@@ -199,6 +199,10 @@ mod tests {
             assert!(error.contains(stated), "{line}: {error}");
         }
         assert!(parsed(&[0xff, 0xfe]).is_err());
+        for (line, is_advised) in [("gap is 24.2", true), ("", true), (r#"{"acceleration_mps2": 0.0,"#, false)] {
+            let advice = parsed(line.as_bytes()).unwrap_err().advice();
+            assert_eq!(advice.is_some_and(|advice| advice.contains("standard error")), is_advised, "{line}");
+        }
     }
 
     #[test]

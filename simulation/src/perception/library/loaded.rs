@@ -113,7 +113,7 @@ impl Library {
     fn reason(&self, perception: *mut c_void) -> String {
         // SAFETY: the perception is null, or lives.
         let stated = self.error.and_then(|error| unsafe { text(foreign_call(ERROR, || error(perception))) });
-        stated.map(|stated| format!(": {stated}")).unwrap_or_default()
+        stated.map_or_else(|| format!("; a text of `{ERROR}` would say why"), |stated| format!(": {stated}"))
     }
 }
 
