@@ -10,7 +10,7 @@ use super::folder::{AHEAD, FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
 use super::host::{Refusal, refusal};
 use super::ledger::Inference;
-use super::partition::Partition;
+use super::partition::{Partition, samples_in};
 use super::record::{ArmRecord, Record};
 use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
@@ -178,7 +178,8 @@ impl Campaign {
 
     /// Returns the number of samples of all scenarios.
     pub fn len(&self) -> u64 {
-        self.works.iter().map(|work| work.samples(self.partition).count() as u64).sum()
+        let samples = self.works.iter().map(|work| samples_in(self.partition, 0..work.count()));
+        samples.fold(0, u64::saturating_add)
     }
 
     /// Returns true if the campaign has no samples.

@@ -8,7 +8,7 @@ use closecall_scenarios::ScenarioFile;
 use crate::identity::Identity;
 use crate::ledger::Inference;
 use crate::manifest::Manifest;
-use crate::partition::Partition;
+use crate::partition::{Partition, samples_in};
 use crate::record::Record;
 use crate::sampling::Sampling;
 use crate::saved::scenario_files;
@@ -122,9 +122,8 @@ impl JournalPlan {
         let Position { work: current, sample: first } = self.next;
         let rest = self.files.iter().enumerate().skip(current).map(|(work, file)| {
             let count = file.space().samples(self.sampling.design, self.sampling.samples);
-            let numbers = (if work == current { first } else { 0 })..count;
-            numbers.filter(|&sample| self.partition.is_none_or(|part| part.contains(sample))).count() as u64
+            samples_in(self.partition, (if work == current { first } else { 0 })..count)
         });
-        rest.sum()
+        rest.fold(0, u64::saturating_add)
     }
 }

@@ -5,12 +5,17 @@
 //! machines. Nothing else determines the part, so that all machines agree.
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
 /// Largest number of parts of a campaign.
 const MAX_PARTS: u64 = 10_000;
+
+/// Largest number of samples of which those of a part are counted one by one. That takes less than
+/// a second.
+const COUNTED_SAMPLES: u64 = 100_000_000;
 
 /// One part of a campaign. `2/3` is the second of three.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -41,6 +46,17 @@ impl Partition {
     /// Returns true if the sample belongs to this part.
     pub const fn contains(self, sample: u64) -> bool {
         split_mix(sample) % self.count == self.part - 1
+    }
+}
+
+/// Returns the number of samples in a part of the campaign, or of all samples, from a range of their
+/// numbers. A part of more than 100,000,000 samples is as large as the average one.
+pub(crate) fn samples_in(part: Option<Partition>, numbers: Range<u64>) -> u64 {
+    let all = numbers.end.saturating_sub(numbers.start);
+    match part {
+        None => all,
+        Some(part) if all > COUNTED_SAMPLES => all.div_ceil(part.count),
+        Some(part) => numbers.filter(|&sample| part.contains(sample)).count() as u64,
     }
 }
 
@@ -105,6 +121,19 @@ mod tests {
             // Six standard deviations of a binomial count.
             assert!(sizes.iter().all(|&size| (size as f64 - even).abs() < 6.0 * even.sqrt()), "{sizes:?}");
         }
+    }
+
+    #[test]
+    fn the_samples_of_a_part_are_counted_without_a_walk_through_endless_ones() {
+        let part = |word: &str| Some(word.parse::<Partition>().unwrap());
+        assert_eq!(samples_in(None, 3..u64::MAX), u64::MAX - 3);
+        assert_eq!(samples_in(None, 5..3), 0);
+        assert_eq!(samples_in(part("1/1"), 3..10), 7);
+        let parts = ["1/3", "2/3", "3/3"].map(|word| samples_in(part(word), 0..10_000));
+        assert_eq!(parts.iter().sum::<u64>(), 10_000);
+        assert_eq!(samples_in(part("2/3"), 0..u64::MAX), u64::MAX / 3);
+        // A large number of samples in the largest number of parts is not nothing.
+        assert!(samples_in(part("10000/10000"), 0..COUNTED_SAMPLES + 1) > 0);
     }
 
     #[test]

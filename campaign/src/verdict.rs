@@ -288,11 +288,7 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         Decision::first_of(&findings.decisions()).filter(spoils).unwrap_or(Decision::Measured)
     } else {
         if !is_judged {
-            let missing = match gates.is_empty() {
-                true => "no gate was set and no requirement was checked: set a gate, or measure without a verdict",
-                false => "no gate was set, and not every check of the requirements is decided",
-            };
-            findings.add(Decision::NotJudged, missing.to_owned());
+            findings.add(Decision::NotJudged, missing_judgement(&gates).to_owned());
         } else {
             let is_bounded = |name: &str| probabilities.iter().any(|(bounded, _)| bounded == name);
             for name in unjudged(judge, &gates).filter(|name| !is_bounded(name)) {
@@ -330,10 +326,25 @@ fn unjudged<'a>(judge: &'a Judge, gates: &'a [GateResult]) -> impl Iterator<Item
 /// Returns true if the gates say something: a gate that somebody set is decided, or every check of
 /// every requirement is. A requirement that is checked in part is not checked.
 fn is_judged(gates: &[GateResult]) -> bool {
-    let is_check = |gate: &&GateResult| matches!(gate.source, GateSource::Requirement(_));
-    let (checks, set): (Vec<&GateResult>, Vec<&GateResult>) = gates.iter().partition(is_check);
+    let (checks, set) = checks_and_set(gates);
     set.iter().any(|gate| gate.is_decided())
         || (!checks.is_empty() && checks.iter().all(|gate| gate.standing() != Standing::NotChecked))
+}
+
+/// Returns the checks of requirements, and the gates that somebody set.
+fn checks_and_set(gates: &[GateResult]) -> (Vec<&GateResult>, Vec<&GateResult>) {
+    gates.iter().partition(|gate| matches!(gate.source, GateSource::Requirement(_)))
+}
+
+/// Returns why gates that judge nothing do not.
+fn missing_judgement(gates: &[GateResult]) -> &'static str {
+    let (checks, set) = checks_and_set(gates);
+    match (checks.is_empty(), set.is_empty()) {
+        (true, true) => "no gate was set and no requirement was checked: set a gate, or measure without a verdict",
+        (false, true) => "no gate was set, and not every check of the requirements is decided",
+        (true, false) => "no gate that was set is decided",
+        (false, false) => "no gate that was set is decided, and not every check of the requirements is",
+    }
 }
 
 fn judge_flaky(flaky: u64, max: Option<u64>, findings: &mut Findings) -> Option<FlakyGate> {

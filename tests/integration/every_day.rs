@@ -34,7 +34,7 @@ fn twelve(folder: &Path) -> Vec<(String, Vec<&'static str>)> {
         ("exec:python3 nothere.py".to_owned(), vec!["nothere.py", "No such file"]),
         (script("syntax.py", "def step(:\n"), vec!["syntax.py", "SyntaxError"]),
         (script("silent.py", &python("pass")), vec!["hangs", "before its first answer"]),
-        (script("words.py", "print('ready', flush=True)\n"), vec!["ready", "not JSON"]),
+        (script("words.py", "print('ready', flush=True)\n"), vec!["ready", "not JSON", "belongs on standard error"]),
         (
             script("version.py", "print('{\"type\":\"hello\",\"protocol\":9}', flush=True)\n"),
             vec!["version 9 of the protocol"],
@@ -377,8 +377,22 @@ fn an_inconclusive_gate_says_how_many_samples_would_decide() {
     let text = stdout(&gate("30"), 4);
     // 1 - 0.05^(1/59) is 0.0495: 59 samples without a collision.
     assert!(text.contains("too few samples to decide, some 59 would if they are like these"), "{text}");
+    assert!(text.contains("no gate that was set is decided") && !text.contains("no gate was set"), "{text}");
     stdout(&gate("59"), 0);
     stdout(&gate("58"), 4);
+}
+
+#[test]
+fn a_number_of_samples_without_end_does_not_delay_the_first_one() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let plan = ["campaign", "low-thw-overtake", "--sensors", "ground-truth", "--time-budget", "2s", "--no-gate", "-n"];
+    let more = ["--no-validity-checks", "--record", "failures:0", "--out", out.to_str().unwrap()];
+    let text = stdout(&closecall(plan.iter().chain(&["18446744073709551615"]).chain(&more)), 0);
+    let samples: u64 = text.split_once(": ").unwrap().1.split_once(' ').unwrap().0.parse().unwrap();
+    assert!(samples > 0, "{text}");
+    // The samples that the clock has left out are not counted one by one, either.
+    stdout(&closecall(["check", out.to_str().unwrap()]), 0);
 }
 
 #[test]
