@@ -253,7 +253,7 @@ impl CampaignArgs {
     fn workers(&self) -> Result<Workers, CliError> {
         let timeout_s = self.sample_timeout_s.map_or(SAMPLE_TIMEOUT_S, |time| time.0);
         let usage =
-            |why| CliError::usage(format!("{} {timeout_s}: the time is too {why}", Argument("sample-timeout-s")));
+            |why| CliError::usage(format!("{} {timeout_s:?}: the time is too {why}", Argument("sample-timeout-s")));
         let sample_timeout = Duration::try_from_secs_f64(timeout_s).map_err(|_| usage("long"))?;
         if sample_timeout.is_zero() {
             return Err(usage("short"));
