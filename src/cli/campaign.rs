@@ -84,9 +84,10 @@ pub(super) struct CampaignArgs {
     #[arg(long, value_name = "SEED|secret", conflicts_with = "seed", help_heading = heading::SAMPLES)]
     #[serde(default, deserialize_with = "parsed_option")]
     judge_seed: Option<JudgeSeed>,
-    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`; `subset` or
-    /// `importance` for the probability of a rare event, which --event names, and `search` for its
-    /// first case. -n is then the largest number of runs [default: 200000, of a search 2000]
+    /// Sampling design: `random`, `sobol` (a low-discrepancy sequence), `grid`, or `coverage` (fills
+    /// the holes of the scenario's [coverage]); `subset` or `importance` for the probability of a
+    /// rare event, which --event names, and `search` for its first case. -n is then the largest
+    /// number of runs [default: 200000, of a search 2000]
     #[arg(long, default_value_t, help_heading = heading::SAMPLES)]
     #[serde(default, deserialize_with = "plain_design")]
     design: DesignChoice,
@@ -95,8 +96,8 @@ pub(super) struct CampaignArgs {
     rare: RareArgs,
     /// After the samples, run FACTOR times as many with faster sensors (MODE is `object` or
     /// `ground-truth`), the first ones with the same values and random numbers. Both together give
-    /// narrower intervals of the collision, prevented and induced rates, by as much as the modes
-    /// correlate: `object:20`. The rates inform; gates judge the samples of the campaign alone
+    /// narrower intervals of the collision, prevented and induced rates, such as `object:20`: the
+    /// more the modes correlate, the narrower. The rates inform; gates judge the samples of the campaign alone
     #[arg(long, value_name = "MODE:FACTOR", help_heading = heading::SAMPLES)]
     #[serde(default, deserialize_with = "parsed_option")]
     fidelity: Option<FidelityChoice>,

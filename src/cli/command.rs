@@ -140,8 +140,8 @@ enum Command {
     Baseline(baseline::BaselineArgs),
     /// Run one sample of a campaign again, and check that it gives the same bits
     Replay(replay::ReplayArgs),
-    /// Find the stage of the chain whose perfection prevents a failure of a campaign, and what the
-    /// system did
+    /// Find the stage of the chain that would prevent a failure of a campaign if it were perfect, and
+    /// what the system did
     Explain(causes::ExplainArgs),
     /// Find the smallest failing case near a failing sample of a campaign, and the nearest case
     /// that passes; with --nearest, the failing case nearest to the nominal one

@@ -44,8 +44,7 @@ pub(super) struct GateArgs {
     /// 0.95]
     #[arg(long, value_name = "C", help_heading = heading::GATES)]
     confidence: Option<Confidence>,
-    /// Fail if the ego collides in more than K samples of any scenario in which it does not collide
-    /// with the baseline; needs --paired
+    /// Fail if the system induces a collision in more than K samples of any scenario; needs --paired
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     pub(super) max_induced: Option<u64>,
     /// Pass only if, in every scenario, at least this share (0 to 1) of the baseline's collisions
@@ -65,7 +64,7 @@ pub(super) struct GateArgs {
     /// Fail if the ego is slower than the lead vehicle by more than this, in any sample
     #[arg(long, value_name = "M/S", help_heading = heading::GATES)]
     max_speed_deficit_mps: Option<Positive>,
-    /// Fail if the ego's jerk exceeds this in any sample, before a collision of its own
+    /// Fail if the ego's jerk exceeds this in any sample, before it collides
     #[arg(long, value_name = "M/S³", alias = "max-jerk-mps3", help_heading = heading::GATES)]
     max_jerk: Option<Positive>,
     /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at

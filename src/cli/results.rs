@@ -44,9 +44,8 @@ const OPEN: &str = if cfg!(target_os = "macos") {
 #[serde(default)]
 pub(super) struct ResultsArgs {
     /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and
-    /// recordings. It must be new or empty [default: closecall-results, which replaces the last
-    /// results there; these become closecall-results.previous, unless they are unfinished and it
-    /// holds finished ones]
+    /// recordings. It must be new or empty [default: closecall-results; the results of the last
+    /// campaign become closecall-results.previous, but unfinished ones do not replace finished ones]
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Keep no results, only print them

@@ -38,7 +38,7 @@ use crate::exit_code::ExitCode;
 ]))]
 pub(super) struct ViewArgs {
     /// Folder of a campaign, whose samples are explored in the browser; or a recording (.rrd) or a
-    /// folder that has some, for the viewer [default: the last campaign, in closecall-results]
+    /// folder of recordings, for the viewer [default: the last campaign, in closecall-results]
     path: Option<PathBuf>,
     /// Open the recordings of the campaign in the viewer instead of the explorer, and the report if
     /// no folder is named
