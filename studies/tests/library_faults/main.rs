@@ -73,7 +73,8 @@ const TABLE: [(&str, Of, Effect); 82] = [
     ("object-blocked", Of::RearObject, Hidden { left_m: 0.0 }),
     ("object-clock-offset", Of::RearObject, Nearer { by_m: 0.5 }),
     ("object-dead", Of::RearObject, Dead { from_step: 125 }),
-    ("object-dirty", Of::RearObject, Range { share: [0.58, 0.7] }),
+    // A range share of 0.64. A usual car may have its first track at up to 1.15 times its range.
+    ("object-dirty", Of::RearObject, Range { share: [0.64 / 1.16, 0.7] }),
     ("object-dropout", Of::RearObject, Coasts { share: [0.65, 0.95] }),
     ("object-frozen", Of::RearObject, Frozen { from_step: 125 }),
     ("object-ghost", Of::RearObject, Ghost),
