@@ -223,7 +223,7 @@ fn beyond(points: &[Point]) -> Option<Point> {
     let (close, far) = (middle(if close.is_empty() { &near } else { close }), middle(far));
     let length_m = maths::hypot(close.0 - far.0, close.1 - far.1);
     let share = END_M / length_m;
-    (length_m > SAME_POINT_M).then(|| (first.0 + share * (close.0 - far.0), first.1 + share * (close.1 - far.1)))
+    (length_m > SAME_POINT_M).then_some((first.0 + share * (close.0 - far.0), first.1 + share * (close.1 - far.1)))
 }
 
 /// Returns the tangent of half the angle by which the way from `a` over `b` to `c` turns to the

@@ -215,9 +215,9 @@ mod tests {
         let delegated = group("memory");
         let slice = delegated.path().join("app.slice");
         fs::create_dir(&slice).unwrap();
-        [PASSED_ON, PROCESSES]
-            .iter()
-            .for_each(|file| drop(fs::copy(delegated.path().join(file), slice.join(file)).unwrap()));
+        for file in [PASSED_ON, PROCESSES] {
+            fs::copy(delegated.path().join(file), slice.join(file)).unwrap();
+        }
         assert!(is_place(delegated.path()) && !is_place(&slice));
     }
 
