@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 /// Largest number of parts of a campaign.
 const MAX_PARTS: u64 = 10_000;
 
-/// Largest number of samples of which those of a part are counted one by one. That takes less than
-/// a second.
+/// Up to this number of samples, the samples of a part are counted one by one, in less than a
+/// second.
 const COUNTED_SAMPLES: u64 = 100_000_000;
 
 /// One part of a campaign. `2/3` is the second of three.

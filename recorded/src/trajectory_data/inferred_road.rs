@@ -660,7 +660,7 @@ fn smoothed(points: &[Point]) -> Vec<Point> {
     once.iter().zip(&twice).map(|(once, twice)| (2.0 * once.0 - twice.0, 2.0 * once.1 - twice.1)).collect()
 }
 
-/// Returns the doubt about a road in parts of which too few vehicles show how it goes on.
+/// Returns the doubt about a road if too few vehicles show how parts of it go on.
 fn doubt_of_sections(unknown: f64) -> String {
     format!(
         "the file names no lanes, and {:.0} % of its rows are where fewer than {LEAST_MOVING} vehicles show whether the road bends or a \

@@ -201,7 +201,7 @@ impl OffsetSides {
         }
     }
 
-    /// Checks the rows so far, which are those of this number of vehicles; the lateral position is read as
+    /// Checks the rows so far, of this number of vehicles; the lateral position is read as
     /// mirrored if `is_mirrored`.
     ///
     /// # Errors

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A road is inferred from the paths of vehicles before positions along the road are known. A path that
-//! jumps back, or to the vehicle beside it, is not the path of a road. The limits are those of
-//! `continuity`, which splits tracks.
+//! jumps back, or to the vehicle beside it, is not the path of a road. The limits are the ones
+//! by which `continuity` splits tracks.
 
 use closecall_traffic::{Time, maths};
 

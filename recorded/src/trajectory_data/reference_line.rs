@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn an_end_with_errors_is_continued_in_the_direction_of_its_last_forty_metres() {
-        // Points every 2 m, of which the last one is 0.3 m aside: the last segment points aside by 0.15 rad.
+        // Points every 2 m. The last one is 0.3 m aside: the last segment points aside by 0.15 rad.
         let aside_m = |k: u32| if k == 50 { 0.3 } else { 0.0 };
         let line = ReferenceLine::through((0..=50).map(|k| (2.0 * f64::from(k), aside_m(k))));
         assert!(line.project((200.0, 0.0)).d_m < -14.0);

@@ -71,7 +71,7 @@ impl Film {
         Some(format!("{collision}; smallest headway: {}", headways(outcome)))
     }
 
-    /// Returns the smallest headways, those of the baseline of a pair, and since when the ego saw
+    /// Returns the smallest headways, also with the baseline of a pair, and since when the ego saw
     /// the vehicle behind.
     pub(in crate::run) fn headways_and_sight(&self, baseline: Option<&Self>) -> Option<String> {
         let sight = self.sight().map_or(String::new(), |sight| format!(" {sight}"));

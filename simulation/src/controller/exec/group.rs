@@ -188,7 +188,7 @@ mod tests {
         let scope = "/user.slice/user-1000.slice/user@1000.service/app.slice/run-r1.scope";
         let expected = Some(PathBuf::from(format!("/sys/fs/cgroup{scope}")));
         assert_eq!(own_group(MOUNTS, &format!("0::{scope}\n")), expected);
-        // A hybrid hierarchy lists those of version 1 first.
+        // A hybrid hierarchy lists the groups of version 1 first.
         assert_eq!(own_group(MOUNTS, &format!("4:memory:/other\n1:cpu:/\n0::{scope}\n")), expected);
         // A mount that shows a part of the hierarchy.
         let part = MOUNTS.replace("0:26 / ", "0:26 /user.slice ");
