@@ -77,7 +77,8 @@ fn head(sentence: &str) -> String {
 }
 
 /// Returns the table of the scenarios with their own drivers, and the agreement of the sensor
-/// modes.
+/// modes. It takes hours: each scenario's rows appear as soon as they are known.
+#[expect(clippy::print_stderr, reason = "a program on the command line")]
 pub(super) fn library(size: Size) -> Result<String, Box<dyn Error>> {
     let Size { samples, member_samples, seed } = size;
     let mut text = head(&format!(
@@ -90,7 +91,9 @@ pub(super) fn library(size: Size) -> Result<String, Box<dyn Error>> {
     for Entry { file, samples } in &library {
         let size = Size { samples: *samples, ..size };
         let name = file.config().name.clone();
-        text.push_str(&rows_of(&name, *samples, &run(vec![file.clone()], size, Some(SensorMode::Full), &arms)?)?);
+        let rows = rows_of(&name, *samples, &run(vec![file.clone()], size, Some(SensorMode::Full), &arms)?)?;
+        eprint!("{rows}");
+        text.push_str(&rows);
     }
     text.push_str(
         "\n### Other functions\n\nScenarios that judge emergency braking or cruise control. Each is compared with the same stack \
@@ -102,7 +105,9 @@ pub(super) fn library(size: Size) -> Result<String, Box<dyn Error>> {
         let arms = ControllerChoice::of_function(file.config().function).map(|arm| arm.to_string());
         let arms = arms.each_ref().map(String::as_str);
         let name = file.config().name.clone();
-        text.push_str(&rows_of(&name, samples, &run(vec![file], size, Some(SensorMode::Full), &arms)?)?);
+        let rows = rows_of(&name, samples, &run(vec![file], size, Some(SensorMode::Full), &arms)?)?;
+        eprint!("{rows}");
+        text.push_str(&rows);
     }
     text.push_str(
         "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the first of the same \
