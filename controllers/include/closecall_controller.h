@@ -128,7 +128,7 @@ typedef struct {
 
 /* The answer to one control step. Closecall sets the acceleration to NaN before the call. */
 typedef struct {
-    double acceleration_mps2; /* commanded acceleration (m/s^2), until the next step; finite */
+    double acceleration_mps2; /* commanded acceleration (m/s^2), until the next step; -100 to 100 */
     int32_t state;            /* CLOSECALL_STATE_... */
     uint32_t reserved;        /* 0 */
 } closecall_command;

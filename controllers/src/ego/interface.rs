@@ -101,7 +101,7 @@ pub enum EgoState {
 /// The command of an ego controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EgoCommand {
-    /// Commanded acceleration (m/s²); must be finite.
+    /// Commanded acceleration (m/s²). The closed loop refuses one beyond ±100 m/s².
     pub acceleration_mps2: f64,
     /// The state of the stack.
     pub state: EgoState,

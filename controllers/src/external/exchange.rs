@@ -213,8 +213,8 @@ const STATES: [EgoState; 5] =
 /// The answer of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// The commanded acceleration (m/s²). It may be any number: the closed loop refuses one that is
-    /// not finite.
+    /// The commanded acceleration (m/s²). It may be any number: the closed loop refuses one that no
+    /// vehicle could follow.
     pub acceleration_mps2: f64,
     /// The state.
     pub state: EgoState,

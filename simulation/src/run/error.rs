@@ -4,6 +4,11 @@ use closecall_controllers::{ControllerError, DriverError};
 use closecall_sensors::SensorError;
 use closecall_traffic::{ActorId, ConfigError, Time};
 
+/// Largest acceleration that an ego controller may ask for, in either direction (m/s²). The tyres
+/// limit what the vehicle does, at some 10 m/s²; racing cars brake with some 50 m/s². A larger
+/// number has another unit, such as mm/s². An assumption; 20 to 1,000 are plausible.
+pub(super) const LARGEST_COMMAND_MPS2: f64 = 100.0;
+
 /// A run that could not be completed. It is an error of this sample: it is counted and reported,
 /// and never passes.
 ///
@@ -35,8 +40,11 @@ pub enum SampleError {
     /// The ego controller failed.
     #[error("the ego controller {0}")]
     Controller(#[from] ControllerError),
-    /// The acceleration that the ego controller commanded is not a finite number.
-    #[error("the ego controller asked for an acceleration of {value} m/s² at {time}")]
+    /// The acceleration that the ego controller commanded is no number that a vehicle could follow.
+    #[error(
+        "the ego controller asked for an acceleration of {value} m/s² at {time}: it must be a number from -{limit} to {limit}",
+        limit = LARGEST_COMMAND_MPS2
+    )]
     Command {
         /// The commanded acceleration (m/s²).
         value: f64,

@@ -15,6 +15,7 @@ use closecall_traffic::{
 use super::cost::{CostMeter, Instant, Rear};
 use super::ego_input::{odometry, sensor_availability};
 use super::equipment::perception;
+use super::error::LARGEST_COMMAND_MPS2;
 use super::events::Events;
 use super::humans::{Human, human_drivers, looks, weave};
 use super::margins::{MarginMeter, Widths};
@@ -197,7 +198,7 @@ impl<'a> Run<'a> {
         command: EgoCommand,
         observer: &mut dyn Observer,
     ) -> Result<Option<EndReason>, SampleError> {
-        if !command.acceleration_mps2.is_finite() {
+        if !(command.acceleration_mps2.abs() <= LARGEST_COMMAND_MPS2) {
             return Err(SampleError::Command { value: command.acceleration_mps2, time: self.world.time() });
         }
         self.accept_command(command, observer);

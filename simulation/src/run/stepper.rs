@@ -68,8 +68,8 @@ impl Stepper {
     /// nothing if the run has ended.
     ///
     /// # Errors
-    /// [`SampleError`] if the command is not finite, or if a driver or a sensor fails. The run has
-    /// then ended without an outcome.
+    /// [`SampleError`] if no vehicle could follow the command, or if a driver or a sensor fails. The
+    /// run has then ended without an outcome.
     pub fn step(&mut self, command: EgoCommand, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let Some(mut run) = self.run.take() else { return Ok(()) };
         match run.command(command, observer)? {
@@ -172,16 +172,21 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_is_not_finite_ends_the_run_without_an_outcome() {
+    fn a_command_that_no_vehicle_could_follow_ends_the_run_without_an_outcome() {
         let key = RunKey { seed: 0, sample: 0 };
         let mut stepper = Stepper::new(scenario(), key, Some(SensorMode::Object), &mut NoObserver).unwrap();
-        let command = EgoCommand {
-            acceleration_mps2: f64::NAN,
+        let command = |acceleration_mps2| EgoCommand {
+            acceleration_mps2,
             state: EgoState::Following,
             reason: Reason::External,
             plan: None,
         };
-        assert!(matches!(stepper.step(command, &mut NoObserver), Err(SampleError::Command { .. })));
+        stepper.step(command(-100.0), &mut NoObserver).unwrap();
+        let error = stepper.step(command(-100.5), &mut NoObserver).unwrap_err();
+        let expected = "the ego controller asked for an acceleration of -100.5 m/s² at 0.04 s: it must be a number from -100 to 100";
+        assert_eq!(error.to_string(), expected);
         assert!(stepper.input().is_none() && stepper.outcome().is_none());
+        let mut stepper = Stepper::new(scenario(), key, Some(SensorMode::Object), &mut NoObserver).unwrap();
+        assert!(matches!(stepper.step(command(f64::NAN), &mut NoObserver), Err(SampleError::Command { .. })));
     }
 }
