@@ -18,7 +18,7 @@ use crate::support::{closecall, code, folder, library, message, program, records
 const TIMEOUT_MS: &str = "2000";
 
 /// The faults of `bad.sh`: its arguments, and a part of the error message.
-const FAULTS: [(&str, &str); 19] = [
+const FAULTS: [(&str, &str); 22] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
@@ -28,6 +28,9 @@ const FAULTS: [(&str, &str); 19] = [
     ("garbage", "the process answered \"what?\", which is not JSON"),
     ("nan", "asked for an acceleration of nan m/s², which is not a finite number"),
     ("infinite", "asked for an acceleration of 1e999 m/s², which is not a finite number"),
+    ("millimetres", "asked for an acceleration of -9810 m/s² at 0.04 s: it must be a number from -100 to 100"),
+    ("doubled", "`acceleration_mps2` must be there once, it is there twice"),
+    ("real-time", "`time_ns` must be a whole number, the `time_ns` of the step, it is 40000000.0"),
     ("missing", "`acceleration_mps2` must be a number, it is absent"),
     ("state", "`state` must be one of following, increasing"),
     ("huge", "answered with a line of more than 1048576 bytes"),

@@ -99,11 +99,14 @@ fn a_fixed_step_divides_the_control_step() {
 }
 
 /// The faults of `faulty_fmu.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 9] = [
+const FAULTS: [(&str, &str); 12] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV))"),
     ("throws-cpp", "the library threw a C++ exception out of fmi2DoStep: catch it inside the function"),
     ("hang", "failed at 2.00 s: no answer within 500 ms"),
     ("nan", "asked for an acceleration of NaN m/s² at 2.00 s"),
+    ("millimetres", "asked for an acceleration of -9810 m/s² at 2.00 s: it must be a number from -100 to 100"),
+    ("sets-not", "the variable `ego_speed`: fmi2SetReal answered fmi2Error"),
+    ("terminates-not", "fmi2Terminate answered fmi2Error: the log is lost"),
     ("state", "the FMU answered the state 7: the state must be 0 (following)"),
     ("error", "fmi2DoStep answered fmi2Error: the solver does not converge"),
     ("fatal", "fmi2DoStep answered fmi2Fatal: the solver does not converge"),
@@ -148,7 +151,12 @@ fn a_fault_of_an_fmu_costs_its_samples_and_changes_no_other() {
     let out = folder.path().join("none");
     assert_eq!(code(&campaign(&controller, &out, "1", Some("no-instance"), &[])), 5);
     let failure = records(&out)[0].arms[1].result.clone().unwrap_err();
-    assert!(failure.message.contains("the FMU created no instance: no licence"), "{}", failure.message);
+    let expected = "fmi2Instantiate answered null: the FMU created no instance: no licence";
+    assert!(failure.message.contains(expected), "{}", failure.message);
+    let terminated = run("terminates-not");
+    assert_eq!(code(&terminated), 5, "{}", stderr(&terminated));
+    let expected = "fmi2Terminate answered fmi2Error: the log is lost";
+    assert!(message(&terminated).contains(expected), "{}", stderr(&terminated));
 }
 
 #[test]
@@ -235,13 +243,14 @@ fn an_fmu_that_cannot_be_used_is_refused_before_the_first_sample() {
         ),
         (with("unit", "3", "unit=\"m/s\"", "unit=\"km/h\""), "has the unit `km/h`; expected `m/s`"),
         (with("input", "2", "name=\"front_gap\"", "name=\"range\""), "its input `range` is not the name of a quantity"),
-        (with("swapped", "3", "fmiVersion=\"3.0\"", "fmiVersion=\"2.0\""), "does not export `fmi2Instantiate`"),
+        (with("swapped", "3", "fmiVersion=\"3.0\"", "fmiVersion=\"2.0\""), "acc.so does not export `fmi2Instantiate`"),
     ];
     for (controller, expected) in cases {
         let out = folder.path().join("out");
         let output = campaign(&controller, &out, "1", None, &[]);
         assert_eq!(code(&output), 3, "{controller}: {}", stderr(&output));
-        assert!(message(&output).contains(expected), "{controller}: {}", stderr(&output));
+        let said = message(&output);
+        assert!(said.contains(expected) && !said.contains("closecall-fmu-"), "{controller}: {said}");
         assert!(!out.exists(), "{controller}");
     }
 }

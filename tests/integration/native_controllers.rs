@@ -154,7 +154,7 @@ fn libraries_in_c_and_rust_have_the_outcomes_of_the_built_in_controller() {
 }
 
 /// The faults of `faulty.c`, each with a part of the message of its samples.
-const FAULTS: [(&str, &str); 15] = [
+const FAULTS: [(&str, &str); 16] = [
     ("segfault", "the controller ended its process (signal: 11 (SIGSEGV)); it last wrote: about to crash"),
     ("child", "the controller ended its process (signal: 11 (SIGSEGV))"),
     (
@@ -172,6 +172,7 @@ const FAULTS: [(&str, &str); 15] = [
     ("hang", "failed at 2.00 s: no answer within 500 ms"),
     ("nan", "asked for an acceleration of NaN m/s² at 2.00 s"),
     ("infinite", "asked for an acceleration of -inf m/s² at 2.00 s"),
+    ("millimetres", "asked for an acceleration of -9810 m/s² at 2.00 s: it must be a number from -100 to 100"),
     ("state", "the library answered the state 9: the state must be 0 (following)"),
     ("error", "the library answered with the error 7: the map is missing"),
     ("leak", "holds more than the 256 MiB of memory allowed"),
@@ -427,7 +428,8 @@ fn a_library_can_create_no_controller() {
     assert_eq!(code(&campaign(&lib(&library), &out, "1", None, &[])), 5);
     for record in records(&out) {
         let failure = record.arms[1].result.clone().unwrap_err();
-        assert!(failure.message.contains("the library created no controller: no licence"), "{}", failure.message);
+        let expected = "closecall_controller_create answered null: the library created no controller: no licence";
+        assert!(failure.message.contains(expected), "{}", failure.message);
     }
     // A library that says nothing is told where a text belongs.
     let silent = text.lines().filter(|line| !line.contains("_error(")).collect::<Vec<_>>().join("\n");

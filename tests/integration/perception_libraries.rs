@@ -68,7 +68,7 @@ const FAULTS: [(&str, &str); 8] = [
     ("exit-3", "the perception ended its process (exit status: 3)"),
     ("closes", "its process"),
     ("error", "the library answered with the error 7: the map is missing"),
-    ("no-licence", "the library created no perception: no licence"),
+    ("no-licence", "closecall_perception_create answered null: the library created no perception: no licence"),
     ("hang", "hangs: no answer in twice the 500 ms allowed"),
 ];
 

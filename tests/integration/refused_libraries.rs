@@ -55,6 +55,14 @@ fn refusals(folder: &Path) -> BTreeMap<&'static str, (String, i32, Vec<String>)>
             ),
         ),
         (
+            "names of C++",
+            (
+                lib(&source("names", "int _Z24closecall_controller_abiv(void) { return 1; }")),
+                3,
+                vec!["which are names of C++: declare the functions `extern \"C\"`".to_owned()],
+            ),
+        ),
+        (
             "missing reference",
             (
                 lib(&source("reference", &complete("1", "int absent(void);\nint use(void) { return absent(); }"))),

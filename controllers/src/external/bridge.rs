@@ -15,6 +15,9 @@ use crate::external::fmu::VariableTable;
 use crate::external::loaded::Loaded;
 use crate::external::message::{RoadMessage, StepMessage};
 
+/// The key under which an answer says why there is none.
+pub const ERROR_KEY: &str = "error";
+
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 enum Message {
@@ -54,11 +57,18 @@ pub fn serve(
                 let StepMessage { time_ns, odometry, front, tracks, sensors, .. } = *step;
                 let values = step_values(Time::from_ns(time_ns), &odometry, front.as_ref(), sensors);
                 let input = Input::with(values, tracks.iter().map(Track::from).collect());
-                text(session.step((loaded, table), || setup.clone(), &input)?, time_ns)
+                match session.step((loaded, table), || setup.clone(), &input) {
+                    Ok(answer) => text(answer, time_ns),
+                    Err(reason) => json!({ "time_ns": time_ns, ERROR_KEY: reason }).to_string(),
+                }
             }
             Message::End => {
+                let finished = session.finish(Time::ZERO);
                 session = Session::default();
-                json!({ "type": "end" }).to_string()
+                match finished {
+                    Ok(()) => json!({ "type": "end" }).to_string(),
+                    Err(reason) => json!({ ERROR_KEY: reason }).to_string(),
+                }
             }
         };
         let written = writeln!(answers, "{answer}").and_then(|()| answers.flush());

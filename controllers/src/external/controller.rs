@@ -45,6 +45,10 @@ impl EgoController for NativeController {
             answer.map_err(|reason| ControllerError::Own { reason, time: input.time })?;
         Ok(EgoCommand { acceleration_mps2, state, reason: Reason::External, plan: None })
     }
+
+    fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
+        self.session.finish(time).map_err(|reason| ControllerError::Own { reason, time })
+    }
 }
 
 /// The controller of a run, from its first step on.
@@ -69,6 +73,12 @@ impl Session {
         let answer = run.step(input);
         drop(call);
         answer
+    }
+
+    /// Ends the run at `time`.
+    pub(crate) fn finish(&mut self, time: Time) -> Result<(), String> {
+        let _call = Call::begin(time);
+        self.0.as_mut().map_or(Ok(()), |run| run.finish())
     }
 }
 

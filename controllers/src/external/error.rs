@@ -97,5 +97,11 @@ fn listed(names: &[String]) -> String {
 }
 
 fn exported(symbols: &[String]) -> String {
-    if symbols.is_empty() { "it exports nothing".to_owned() } else { format!("it exports {}", listed(symbols)) }
+    if symbols.is_empty() {
+        return "it exports nothing".to_owned();
+    }
+    // The names that C++ gives to functions with their types.
+    let is_cpp = symbols.iter().any(|name| name.starts_with("_Z"));
+    let advice = if is_cpp { ", which are names of C++: declare the functions `extern \"C\"`" } else { "" };
+    format!("it exports {}{advice}", listed(symbols))
 }

@@ -19,4 +19,9 @@ pub struct Identity {
 pub(crate) trait Run: Send {
     /// Returns the answer to a control step, or why there is none.
     fn step(&mut self, input: &Input) -> Result<Answer, String>;
+
+    /// Ends the run, or returns why its answers cannot be trusted.
+    fn finish(&mut self) -> Result<(), String> {
+        Ok(())
+    }
 }

@@ -136,7 +136,11 @@ impl Library {
         // SAFETY: the view is valid during the call.
         let controller = setup.with_view(|view| foreign_call(NEEDED[1], || unsafe { (self.create)(view) }));
         if controller.is_null() {
-            return Err(format!("the library created no controller{}", self.reason(controller)));
+            return Err(format!(
+                "{} answered null: the library created no controller{}",
+                NEEDED[1],
+                self.reason(controller)
+            ));
         }
         Ok(LibraryRun { library: self.clone(), controller })
     }

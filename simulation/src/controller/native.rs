@@ -132,7 +132,10 @@ impl NativeSettings {
         })?;
         let settings = self.process(folder, &["probe", &self.text(), &text]);
         let controller = self.text();
-        let crash = |error: ExecError| NativeError::Crash { controller: controller.clone(), reason: error.to_string() };
+        let crash = |error: ExecError| {
+            let reason = error.end_of_isolated("the controller").unwrap_or_else(|| error.to_string());
+            NativeError::Crash { controller: controller.clone(), reason }
+        };
         let mut child = Child::start(&settings, folder).map_err(crash)?;
         let limit = LOAD_TIMEOUT.max(Duration::from_millis(self.timeout_ms));
         let Some(line) = child.request_within(Vec::new(), limit).map_err(crash)? else {

@@ -9,7 +9,7 @@ use closecall_traffic::{ClassScores, Range, Source, Time, Track, TrackId, TrackS
 use nalgebra::{Matrix4, Vector4};
 use serde_json::{Map, Value};
 
-use crate::controller::exec::{ExecError, excerpt};
+use crate::controller::exec::{ExecError, excerpt, unique};
 
 /// Largest number of detections or tracks in an answer. An assumption: a motorway has some tens of
 /// vehicles in view.
@@ -366,11 +366,15 @@ fn is_positive_definite<const N: usize>(matrix: [[f64; N]; N]) -> bool {
 
 fn object(line: &[u8]) -> Result<Map<String, Value>, AnswerError> {
     let not_json = |reason: String| AnswerError::NotJson { line: excerpt(line), reason };
-    match serde_json::from_slice(line) {
+    match unique::parse(line) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(AnswerError::NotObject { line: excerpt(line) }),
         // JSON has neither NaN nor infinity, but the JSON writers of many languages write them.
-        Err(error) => Err(match not_finite(line) {
+        Err(unique::Refused::Repeated(field)) => {
+            let (needed, actual) = ("there once".to_owned(), "there twice".to_owned());
+            Err(AnswerError::Field { line: excerpt(line), field, needed, actual })
+        }
+        Err(unique::Refused::NotJson(error)) => Err(match not_finite(line) {
             Some((field, actual)) => {
                 AnswerError::Field { line: excerpt(line), field, needed: "a finite number".to_owned(), actual }
             }
@@ -535,6 +539,7 @@ mod tests {
             (r#"{"time_ns":80000000,"tracks":[1]}"#, "`tracks[0]` must be an object, it is 1"),
             ("[]", "answered \"[]\": it must be an object of JSON"),
             ("null", "answered \"null\": it must be an object of JSON"),
+            (r#"{"time_ns":80000000,"tracks":[{"id":3,"id":4}]}"#, "`id` must be there once, it is there twice"),
             ("tracks", "not JSON"),
         ] {
             let error = parse(line).unwrap().unwrap_err().to_string();

@@ -31,6 +31,11 @@ pub(super) struct Unpacked {
 }
 
 impl Unpacked {
+    /// Returns the name of the binary in the archive.
+    pub(super) fn binary_name(&self) -> String {
+        self.binary.strip_prefix(&self.place).unwrap_or(&self.binary).display().to_string()
+    }
+
     /// Returns the folder of the FMU's resources.
     pub(super) fn resources(&self) -> PathBuf {
         self.place.join("resources")

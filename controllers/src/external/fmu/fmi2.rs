@@ -177,7 +177,7 @@ impl Instance2 {
             )
         });
         if component.is_null() {
-            return Err(format!("the FMU created no instance{}", logged()));
+            return Err(format!("fmi2Instantiate answered null: the FMU created no instance{}", logged()));
         }
         Ok(Self { functions, component, _callbacks: callbacks, is_initialized: false, is_dead: false })
     }
@@ -197,7 +197,7 @@ impl Instance2 {
 fn logged() -> String {
     match LOGGED.lock() {
         Ok(logged) if !logged.is_empty() => format!(": {logged}"),
-        _ => String::new(),
+        _ => "; a message to its logger would say why".to_owned(),
     }
 }
 
@@ -223,8 +223,13 @@ impl Instance for Instance2 {
     fn set(&mut self, reference: u32, of_type: Type, value: f64) -> Result<(), String> {
         #[expect(clippy::cast_possible_truncation, reason = "whole numbers; a cast saturates")]
         let whole = value as c_int;
+        let function = match of_type {
+            Type::Float64 | Type::Float32 => "fmi2SetReal",
+            Type::Boolean => "fmi2SetBoolean",
+            _ => "fmi2SetInteger",
+        };
         // SAFETY: as above; the values live during the call.
-        let status = foreign_call("a function fmi2Set…", || unsafe {
+        let status = foreign_call(function, || unsafe {
             match of_type {
                 Type::Float64 | Type::Float32 => {
                     (self.functions.set_real)(self.component, &raw const reference, 1, &raw const value)
@@ -236,20 +241,21 @@ impl Instance for Instance2 {
                 _ => (self.functions.set_integer)(self.component, &raw const reference, 1, &raw const whole),
             }
         });
-        self.check(status, "setting a variable")
+        self.check(status, function)
     }
 
     fn get(&mut self, reference: u32, of_type: Type) -> Result<f64, String> {
         let (mut value, mut whole) = (f64::NAN, 0);
         let is_real = of_type.is_real();
+        let function = if is_real { "fmi2GetReal" } else { "fmi2GetInteger" };
         // SAFETY: as above.
-        let status = foreign_call("a function fmi2Get…", || unsafe {
+        let status = foreign_call(function, || unsafe {
             match is_real {
                 true => (self.functions.get_real)(self.component, &raw const reference, 1, &raw mut value),
                 false => (self.functions.get_integer)(self.component, &raw const reference, 1, &raw mut whole),
             }
         });
-        self.check(status, "reading a variable")?;
+        self.check(status, function)?;
         Ok(if is_real { value } else { f64::from(whole) })
     }
 
@@ -258,6 +264,13 @@ impl Instance for Instance2 {
         let status =
             foreign_call("fmi2DoStep", || unsafe { (self.functions.do_step)(self.component, time_s, step_s, 1) });
         self.check(status, "fmi2DoStep")
+    }
+
+    fn terminate(&mut self) -> Result<(), String> {
+        self.is_initialized = false;
+        // SAFETY: as above.
+        let status = foreign_call("fmi2Terminate", || unsafe { (self.functions.terminate)(self.component) });
+        self.check(status, "fmi2Terminate")
     }
 
     fn reset(&mut self) -> Result<(), String> {

@@ -119,6 +119,11 @@ impl Functions {
     }
 }
 
+/// Returns the type with whose functions a variable is set and read.
+const fn stored_as(of_type: Type) -> Type {
+    if matches!(of_type, Type::Enumeration) { Type::Int64 } else { of_type }
+}
+
 /// An instance of the FMU.
 pub(super) struct Instance3 {
     functions: Functions,
@@ -134,7 +139,7 @@ unsafe impl Send for Instance3 {}
 fn logged() -> String {
     match LOGGED.lock() {
         Ok(logged) if !logged.is_empty() => format!(": {logged}"),
-        _ => String::new(),
+        _ => "; a message to its logger would say why".to_owned(),
     }
 }
 
@@ -167,7 +172,7 @@ impl Instance3 {
             )
         });
         if component.is_null() {
-            return Err(format!("the FMU created no instance{}", logged()));
+            return Err(format!("fmi3InstantiateCoSimulation answered null: the FMU created no instance{}", logged()));
         }
         Ok(Self { functions, component, is_initialized: false, is_dead: false })
     }
@@ -237,7 +242,7 @@ impl Instance for Instance3 {
             Type::Boolean => self.set_with(functions.set_bool, reference, value != 0.0),
             Type::Other => Err("a variable has a type that cannot be set".to_owned()),
         }?;
-        self.check(status, "setting a variable")
+        self.check(status, &format!("fmi3Set{}", stored_as(of_type)))
     }
 
     fn get(&mut self, reference: u32, of_type: Type) -> Result<f64, String> {
@@ -259,7 +264,7 @@ impl Instance for Instance3 {
             }
             Type::Boolean | Type::Other => return Err("a variable has a type that cannot be read".to_owned()),
         };
-        self.check(status, "reading a variable")?;
+        self.check(status, &format!("fmi3Get{}", stored_as(of_type)))?;
         Ok(value)
     }
 
@@ -287,6 +292,13 @@ impl Instance for Instance3 {
             return Err(format!("fmi3DoStep returned early, at {reached_s} s: that was not allowed"));
         }
         Ok(())
+    }
+
+    fn terminate(&mut self) -> Result<(), String> {
+        self.is_initialized = false;
+        // SAFETY: as above.
+        let status = foreign_call("fmi3Terminate", || unsafe { (self.functions.terminate)(self.component) });
+        self.check(status, "fmi3Terminate")
     }
 
     fn reset(&mut self) -> Result<(), String> {

@@ -35,14 +35,16 @@ pub enum Given {
 /// A variable that is set in each control step, or once.
 #[derive(Clone, Debug)]
 pub(super) struct Set {
+    pub(super) name: String,
     pub(super) reference: u32,
     pub(super) of_type: Type,
     pub(super) quantity: Quantity,
 }
 
 /// A variable that is read after each control step.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Get {
+    pub(super) name: String,
     pub(super) reference: u32,
     pub(super) of_type: Type,
 }
@@ -85,7 +87,7 @@ impl Mapping {
         let mut mapping = Self {
             parameters: Vec::new(),
             inputs: Vec::new(),
-            acceleration: Get { reference: 0, of_type: Type::Other },
+            acceleration: Get { name: String::new(), reference: 0, of_type: Type::Other },
             state: None,
         };
         for variable in description.variables.iter().filter(settable) {
@@ -126,7 +128,8 @@ impl Mapping {
                 ));
             }
             check(variable, &quantity)?;
-            let set = Set { reference: variable.reference, of_type: variable.of_type, quantity };
+            let (name, of_type) = (variable.name.clone(), variable.of_type);
+            let set = Set { name, reference: variable.reference, of_type, quantity };
             if is_input { mapping.inputs.push(set) } else { mapping.parameters.push(set) }
         }
         for output in OUTPUTS {
@@ -144,7 +147,8 @@ impl Mapping {
                             variable.of_type
                         ));
                     }
-                    let get = Get { reference: variable.reference, of_type: variable.of_type };
+                    let (reference, of_type) = (variable.reference, variable.of_type);
+                    let get = Get { name: variable.name.clone(), reference, of_type };
                     if output == "acceleration" {
                         check_unit(variable, "m/s2")?;
                         mapping.acceleration = get;

@@ -8,7 +8,7 @@ use libloading::Library as Module;
 
 use super::archive::{Unpacked, unpack};
 use super::description::{Type, Version};
-use super::mapping::{Mapping, VariableTable};
+use super::mapping::{Get, Mapping, Set, VariableTable};
 use super::{fmi2, fmi3};
 use crate::external::arithmetic::Arithmetic;
 use crate::external::error::LoadError;
@@ -29,6 +29,8 @@ pub(super) trait Instance: Send {
     fn get(&mut self, reference: u32, of_type: Type) -> Result<f64, String>;
     /// Goes from a time (s) a step (s) further.
     fn do_step(&mut self, time_s: f64, step_s: f64) -> Result<(), String>;
+    /// Ends the simulation. Only [`Self::reset`] may follow.
+    fn terminate(&mut self) -> Result<(), String>;
     /// Returns to the state after its creation.
     fn reset(&mut self) -> Result<(), String>;
 }
@@ -76,6 +78,10 @@ impl<I: Instance> Instance for Restoring<I> {
         self.call(|instance| instance.do_step(time_s, step_s))
     }
 
+    fn terminate(&mut self) -> Result<(), String> {
+        self.call(Instance::terminate)
+    }
+
     fn reset(&mut self) -> Result<(), String> {
         self.call(Instance::reset)
     }
@@ -114,9 +120,14 @@ impl Fmu {
             Version::Fmi2 => (&fmi2::NEEDED, "fmi2"),
             Version::Fmi3 => (&fmi3::NEEDED, "fmi3"),
         };
-        platform::check(&unpacked.binary, needed, prefix)?;
+        // The folder of the binary has another name in each process.
+        let in_archive = |error: LoadError| {
+            let (binary, name) = (unpacked.binary.display().to_string(), unpacked.binary_name());
+            refuse(error.to_string().replace(&binary, &name))
+        };
+        platform::check(&unpacked.binary, needed, prefix).map_err(in_archive)?;
         let _kept = Arithmetic::keep();
-        let module = open(&unpacked.binary)?;
+        let module = open(&unpacked.binary).map_err(in_archive)?;
         let functions = match unpacked.description.version {
             Version::Fmi2 => fmi2::Functions::of(&module).map(Functions::Two),
             Version::Fmi3 => fmi3::Functions::of(&module).map(Functions::Three),
@@ -204,12 +215,12 @@ impl Run for FmuRun {
         let start_s = input.values().time_s;
         if !self.has_started {
             for set in &self.mapping.parameters {
-                instance.set(set.reference, set.of_type, set.quantity.value(input, &self.nearest))?;
+                set.write_to(instance.as_mut(), set.quantity.value(input, &self.nearest))?;
             }
             instance.enter(start_s)?;
         }
         for set in &self.mapping.inputs {
-            instance.set(set.reference, set.of_type, set.quantity.value(input, &self.nearest))?;
+            set.write_to(instance.as_mut(), set.quantity.value(input, &self.nearest))?;
         }
         if !self.has_started {
             instance.exit()?;
@@ -219,14 +230,37 @@ impl Run for FmuRun {
         for step in 0..self.fmu.steps {
             instance.do_step(start_s + f64::from(step) * step_s, step_s)?;
         }
-        let acceleration_mps2 = instance.get(self.mapping.acceleration.reference, self.mapping.acceleration.of_type)?;
-        let state = match self.mapping.state {
-            Some(get) => instance.get(get.reference, get.of_type)?,
+        let acceleration_mps2 = self.mapping.acceleration.read_from(instance.as_mut())?;
+        let state = match &self.mapping.state {
+            Some(get) => get.read_from(instance.as_mut())?,
             None => 0.0,
         };
         #[expect(clippy::cast_possible_truncation, reason = "a whole number; a cast saturates")]
         let answer = Answer::new(acceleration_mps2, state as i64);
         answer.map_err(|expected| format!("the FMU answered the state {state}: {expected}"))
+    }
+
+    fn finish(&mut self) -> Result<(), String> {
+        match &mut self.instance {
+            Some(instance) if self.has_started => instance.terminate(),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Set {
+    /// Sets the variable. The message of an error names it.
+    fn write_to(&self, instance: &mut dyn Instance, value: f64) -> Result<(), String> {
+        let set = instance.set(self.reference, self.of_type, value);
+        set.map_err(|reason| format!("the variable `{}`: {reason}", self.name))
+    }
+}
+
+impl Get {
+    /// Reads the variable. The message of an error names it.
+    fn read_from(&self, instance: &mut dyn Instance) -> Result<f64, String> {
+        let value = instance.get(self.reference, self.of_type);
+        value.map_err(|reason| format!("the variable `{}`: {reason}", self.name))
     }
 }
 

@@ -24,7 +24,7 @@ use super::group::Group;
 use super::late::keep_bad_end;
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::processes::{self, Entry};
-use super::protocol::END;
+use super::protocol::{END, stated_error};
 use super::settings::ExecSettings;
 use super::start;
 
@@ -272,7 +272,9 @@ impl Child {
         let answer = self.request(format!("{END}\n").into_bytes(), limit)?;
         if answer != END.as_bytes() {
             self.has_failed = true;
-            return Err(ExecError::OutOfTurn { answered: self.answered.saturating_sub(1), line: excerpt(&answer) });
+            let out_of_turn =
+                || ExecError::OutOfTurn { answered: self.answered.saturating_sub(1), line: excerpt(&answer) };
+            return Err(stated_error(&answer).unwrap_or_else(out_of_turn));
         }
         self.finish_unloading(name)
     }

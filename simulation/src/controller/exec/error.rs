@@ -121,11 +121,17 @@ pub enum ExecError {
         /// The beginning of the line.
         line: String,
         /// The key.
-        key: &'static str,
+        key: String,
         /// What is allowed.
         expected: &'static str,
         /// What was found.
         actual: String,
+    },
+    /// The process of a library or an FMU says why it has no answer.
+    #[error("{reason}")]
+    Stated {
+        /// The reason.
+        reason: String,
     },
     /// The acceleration is not a finite number.
     #[error("the process asked for an acceleration of {value} m/s², which is not a finite number")]
@@ -186,7 +192,8 @@ impl ExecError {
 
 /// Returns true if a line is not even meant as an answer.
 pub(crate) fn is_other_text(line: &str) -> bool {
-    !line.trim_start_matches('\u{feff}').trim_start().starts_with('{')
+    // The mark of UTF-16 is no UTF-8.
+    !line.trim_start_matches(['\u{feff}', char::REPLACEMENT_CHARACTER]).trim_start().starts_with('{')
 }
 
 /// Returns true if a time limit is as long as the limit of a start: whoever exceeds it hangs.

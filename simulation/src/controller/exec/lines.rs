@@ -83,11 +83,23 @@ impl Tail {
     pub(super) fn last_lines(&self) -> String {
         let bytes: Vec<u8> = self.0.iter().copied().collect();
         let text = String::from_utf8_lossy(&bytes);
-        let mut lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         let older = lines.len().saturating_sub(QUOTED_LINES);
-        lines.drain(..older);
+        let lines: Vec<String> = lines[older..].iter().map(|line| without_thread_number(line)).collect();
         excerpt_of(&lines.join(" | "), KEPT_STDERR_BYTES)
     }
+}
+
+/// Returns a line without the number by which the system knows a thread, which differs from run to
+/// run. Rust writes `thread 'main' (4711) has overflowed its stack`.
+fn without_thread_number(line: &str) -> String {
+    let numbered = line.strip_prefix("thread '").and_then(|rest| rest.split_once("' ("));
+    let named = numbered.and_then(|(name, rest)| {
+        let (number, after) = rest.split_once(')')?;
+        let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+        is_number.then(|| format!("thread '{name}'{after}"))
+    });
+    named.unwrap_or_else(|| line.to_owned())
 }
 
 /// Returns the beginning of a line, for an error message.
@@ -149,5 +161,16 @@ mod tests {
             tail.push(format!("line {number}\n").as_bytes());
         }
         assert_eq!(tail.last_lines(), "line 9995 | line 9996 | line 9997 | line 9998 | line 9999");
+    }
+
+    #[test]
+    fn the_number_of_a_thread_is_left_out() {
+        let mut tail = Tail::default();
+        tail.push(b"\nthread 'main' (4711) has overflowed its stack\nfatal runtime error: stack overflow, aborting\n");
+        tail.push(b"thread 'a (b)' (x) is late\n");
+        assert_eq!(
+            tail.last_lines(),
+            "thread 'main' has overflowed its stack | fatal runtime error: stack overflow, aborting | thread 'a (b)' (x) is late"
+        );
     }
 }

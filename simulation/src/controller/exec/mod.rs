@@ -62,6 +62,7 @@ mod processes;
 mod protocol;
 mod settings;
 mod start;
+pub(crate) mod unique;
 
 pub use child::Child;
 pub use closecall_controllers::external::Identity;

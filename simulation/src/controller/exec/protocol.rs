@@ -1,5 +1,6 @@
 //! Writes the messages to a process, and parses its answers.
 
+use closecall_controllers::external::bridge::ERROR_KEY;
 use closecall_controllers::external::{Identity, RoadMessage, StepMessage};
 use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front};
 use closecall_traffic::{CONTROL_STEP, Road};
@@ -8,6 +9,7 @@ use serde_json::{Map, Value};
 
 use super::error::ExecError;
 use super::lines::excerpt;
+use super::unique;
 
 /// Version of the protocol.
 pub(crate) const PROTOCOL: u32 = 1;
@@ -91,7 +93,15 @@ pub(super) struct Asked {
 /// Parses the answer to a control step.
 pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecError> {
     let object = object(line)?;
+    if asked.must_be_repeated
+        && let Some(error) = stated(&object)
+    {
+        return Err(error);
+    }
     let repeated = object.get(TIME_KEY);
+    if repeated.is_some_and(|time| time.as_i64().is_none()) {
+        return Err(key_error(line, &object, TIME_KEY, "a whole number, the `time_ns` of the step"));
+    }
     let is_own = repeated.map_or(!asked.must_be_repeated, |time| time.as_i64() == Some(asked.time_ns));
     if !is_own {
         let repeated_time = repeated.map_or_else(|| "an unstated number of".to_owned(), ToString::to_string);
@@ -114,18 +124,43 @@ pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecErro
     Ok(Answer { acceleration_mps2, state })
 }
 
+/// Returns why the process of a library or an FMU has not ended its run as it should, if it says so.
+pub(super) fn stated_error(line: &[u8]) -> Option<ExecError> {
+    stated(&object(line).ok()?)
+}
+
+fn stated(object: &Map<String, Value>) -> Option<ExecError> {
+    let reason = object.get(ERROR_KEY)?.as_str()?.to_owned();
+    Some(ExecError::Stated { reason })
+}
+
 fn object(line: &[u8]) -> Result<Map<String, Value>, ExecError> {
     // Some runtimes begin their output with a byte order mark.
     let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
-    match serde_json::from_slice(line) {
+    match unique::parse(line) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(ExecError::NotObject { line: excerpt(line) }),
         // JSON has neither NaN nor infinity, but the JSON writers of many languages write them.
-        Err(error) => Err(match not_finite(line) {
+        Err(unique::Refused::NotJson(error)) => Err(match not_finite(line) {
             Some(value) => ExecError::NotFinite { value },
-            None => ExecError::NotJson { line: excerpt(line), reason: error.to_string() },
+            None => ExecError::NotJson { line: excerpt(line), reason: not_json(line, &error) },
         }),
+        Err(unique::Refused::Repeated(key)) => {
+            let (expected, actual) = ("there once", "there twice".to_owned());
+            Err(ExecError::Key { line: excerpt(line), key, expected, actual })
+        }
     }
+}
+
+/// The marks by which a text in UTF-16 begins, in both byte orders.
+const UTF16_MARKS: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
+
+/// Returns why a line is not JSON.
+fn not_json(line: &[u8], error: &serde_json::Error) -> String {
+    if UTF16_MARKS.iter().any(|mark| line.starts_with(mark)) {
+        return "it is UTF-16, and an answer is UTF-8".to_owned();
+    }
+    if error.is_eof() && !line.is_empty() { format!("{error}; an answer is one line") } else { error.to_string() }
 }
 
 /// Returns the acceleration as it is written if it is NaN or infinite, otherwise `None`.
@@ -138,9 +173,9 @@ fn not_finite(line: &[u8]) -> Option<String> {
 }
 
 /// Returns the error that `key` does not have the `expected` value.
-fn key_error(line: &[u8], object: &Map<String, Value>, key: &'static str, expected: &'static str) -> ExecError {
+fn key_error(line: &[u8], object: &Map<String, Value>, key: &str, expected: &'static str) -> ExecError {
     let value = object.get(key).map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
-    ExecError::Key { line: excerpt(line), key, expected, actual: value }
+    ExecError::Key { line: excerpt(line), key: key.to_owned(), expected, actual: value }
 }
 
 #[cfg(test)]
@@ -157,12 +192,19 @@ mod tests {
         for right in ["", ",\"time_ns\":80000000"] {
             parsed(line(right).as_bytes()).unwrap();
         }
-        for wrong in ["40000000", "null", "\"80000000\"", "8e7"] {
-            let error = parsed(line(&format!(",\"time_ns\":{wrong}")).as_bytes()).unwrap_err();
-            assert!(matches!(error, ExecError::OtherStep { expected: 80_000_000, .. }), "{wrong}: {error}");
+        let other = parsed(line(",\"time_ns\":40000000").as_bytes()).unwrap_err();
+        assert!(matches!(other, ExecError::OtherStep { expected: 80_000_000, .. }), "{other}");
+        for wrong in ["null", "\"80000000\"", "8e7", "80000000.0"] {
+            let error = parsed(line(&format!(",\"time_ns\":{wrong}")).as_bytes()).unwrap_err().to_string();
+            let expected = "`time_ns` must be a whole number, the `time_ns` of the step, it is ";
+            assert!(error.contains(expected), "{wrong}: {error}");
         }
         let asked = Asked { time_ns: 80_000_000, must_be_repeated: true, answered: 3 };
         assert!(matches!(parse_answer(line("").as_bytes(), asked), Err(ExecError::OtherStep { .. })));
+        let failed = br#"{"time_ns":80000000,"error":"no map"}"#;
+        assert!(matches!(parse_answer(failed, asked), Err(ExecError::Stated { reason }) if reason == "no map"));
+        // The protocol of other processes does not have the key.
+        assert!(matches!(parsed(failed), Err(ExecError::Key { .. })));
     }
 
     #[test]
@@ -194,11 +236,20 @@ mod tests {
             (r#"{"acceleration_mps2": "-1", "state": "following"}"#, "it is \"-1\""),
             (r#"{"acceleration_mps2": -1}"#, "`state` must be one of following"),
             (r#"{"acceleration_mps2": -1, "state": "driving"}"#, "it is \"driving\""),
+            (
+                r#"{"acceleration_mps2": -1, "acceleration_mps2": -2, "state": "following"}"#,
+                "`acceleration_mps2` must be there once, it is there twice",
+            ),
         ] {
             let error = parsed(line.as_bytes()).unwrap_err().to_string();
             assert!(error.contains(stated), "{line}: {error}");
         }
         assert!(parsed(&[0xff, 0xfe]).is_err());
+        let utf16 = parsed(b"\xff\xfe{\0\"\0").unwrap_err();
+        assert!(utf16.to_string().ends_with("which is not JSON: it is UTF-16, and an answer is UTF-8"), "{utf16}");
+        assert_eq!(utf16.advice(), None);
+        let cut = parsed(b"{").unwrap_err().to_string();
+        assert!(cut.ends_with("an answer is one line"), "{cut}");
         for (line, is_advised) in [("gap is 24.2", true), ("", true), (r#"{"acceleration_mps2": 0.0,"#, false)] {
             let advice = parsed(line.as_bytes()).unwrap_err().advice();
             assert_eq!(advice.is_some_and(|advice| advice.contains("standard error")), is_advised, "{line}");

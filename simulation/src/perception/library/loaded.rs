@@ -104,7 +104,8 @@ impl Library {
         // SAFETY: the view is valid during the call.
         let perception = setup.with_view(|view| foreign_call(NEEDED[2], || unsafe { (self.create)(view) }));
         if perception.is_null() {
-            return Err(format!("the library created no perception{}", self.reason(perception)));
+            let reason = self.reason(perception);
+            return Err(format!("{} answered null: the library created no perception{reason}", NEEDED[2]));
         }
         Ok(Run { library: self, perception })
     }
