@@ -1,9 +1,9 @@
-//! Atomic file output: a file is written under a temporary name in the same folder, and then
-//! renamed.
+//! Atomic file output into a folder.
 
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use closecall_traffic::atomic::write_file;
 
 use super::DatasetError;
 use crate::camera::Image;
@@ -21,12 +21,8 @@ impl Output {
 
     /// Writes one file atomically.
     pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), DatasetError> {
-        let path = self.folder.join(name);
-        let partial = self.folder.join(format!("{name}.partial"));
-        let written = fs::File::create(&partial)
-            .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-            .and_then(|()| fs::rename(&partial, &path));
-        written.map_err(|source| DatasetError::Write { path, source })
+        let written = write_file(&self.folder.join(name), |file| file.write_all(bytes));
+        written.map_err(|error| DatasetError::Write { path: error.path, source: error.source })
     }
 
     /// Writes an image as a PNG file.
