@@ -368,8 +368,8 @@ fn judge_flaky(flaky: u64, max: Option<u64>, findings: &mut Findings) -> Option<
 fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, findings: &mut Findings) {
     if checks.not_checked > 0 {
         let sentence = format!(
-            "not checked: {} of {} that {} chosen for the validity checks, because a check took too long (a campaign that is resumed \
-             and repeats errors runs them again)",
+            "not checked: {} of {} that {} chosen for the validity checks, because a check took too long, or its process failed (a \
+             campaign that is resumed and repeats errors runs them again)",
             checks.not_checked,
             counted(checks.not_checked + checks.runs, "run"),
             was(checks.not_checked + checks.runs)

@@ -221,6 +221,19 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
 }
 
 #[test]
+fn a_library_whose_answers_depend_on_its_process_makes_the_campaign_invalid() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let out = folder.path().join("out");
+    let output = campaign(&library, &out, "1", Some("process-number"), &[]);
+    assert_eq!(code(&output), 7, "{}", stderr(&output));
+    let expected = "the same run gave another outcome when repeated: 2 of ";
+    assert!(String::from_utf8_lossy(&output.stdout).contains(expected), "{output:?}");
+    let out = folder.path().join("sound");
+    stdout(&campaign(&library, &out, "1", Some("none"), &[]), 0);
+}
+
+#[test]
 fn a_run_and_a_campaign_say_the_same_about_a_library_that_ends_its_process() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));

@@ -15,6 +15,7 @@ use super::{Answer, Question, Refusal, Task, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, Flaky, SampleFailure};
 use crate::runner::{ArmRun, Work};
+use crate::validity::{ALWAYS_CHECKED, CheckPlan, Invariance};
 
 /// The kind of a failure of the controller.
 const KIND: &str = "controller";
@@ -138,8 +139,13 @@ impl<W: World> Client<W> {
                 // The message does not depend on the time that the process has taken to start.
                 Err(Trouble::Late) => break SampleError::Timeout { limit_s: limit.as_secs_f64() }.into(),
                 Ok(Answer { record, wall_s, check_s, .. }) => {
+                    let asked = self.world.now();
                     let flaky = first.map(|first| Flaky { crashes, first });
-                    return ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
+                    let record = ArmRecord { flaky, ..record };
+                    let record =
+                        self.repeat_in_new_process((work, arm, sample), record, limit.saturating_sub(asked - started));
+                    let repeated_s = (self.world.now() - asked).as_secs_f64();
+                    return ArmRun { record, wall_s, check_s: check_s + repeated_s };
                 }
                 Err(Trouble::Other(failure)) => break failure,
                 Err(Trouble::Crash(failure)) => {
@@ -156,6 +162,36 @@ impl<W: World> Client<W> {
             wall_s: (self.world.now() - started).as_secs_f64(),
             check_s: 0.0,
         }
+    }
+
+    /// Runs one of the first samples again in a new process, if it is checked, and notes a different
+    /// outcome. A controller whose answers depend on its process, such as on its number or on its
+    /// environment, repeats itself in one process. `limit` is the time that is left.
+    fn repeat_in_new_process(
+        &mut self,
+        (work, arm, sample): (&Work, usize, u64),
+        mut record: ArmRecord,
+        limit: Duration,
+    ) -> ArmRecord {
+        let (Ok(outcome), Some(checks)) = (&record.result, &mut record.checks) else { return record };
+        let is_repeatable = checks.not_checked.is_none() && !checks.broken.contains(&Invariance::Repetition);
+        if sample >= ALWAYS_CHECKED || !is_repeatable {
+            return record;
+        }
+        let again = Work { checks: CheckPlan::off(), ..work.clone() };
+        let answer = self.ask(&again, arm, sample, limit);
+        // The process has no other sample to run.
+        self.workers.remove(&(std::ptr::from_ref(&again) as usize, arm));
+        let failure = match answer.map(|answer| answer.record.result) {
+            Ok(Ok(again)) => {
+                checks.broken.extend((!again.has_same_bits(outcome)).then_some(Invariance::Repetition));
+                return record;
+            }
+            Ok(Err(failure)) | Err(Trouble::Crash(failure) | Trouble::Other(failure)) => failure.message,
+            Err(Trouble::Late) => "the time of the sample is over".to_owned(),
+        };
+        checks.not_checked = Some(format!("{}: {failure}", Invariance::Repetition.name()));
+        record
     }
 
     /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process

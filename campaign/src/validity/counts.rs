@@ -64,7 +64,8 @@ pub struct ArmChecks {
     /// The checks that failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub broken: Vec<Invariance>,
-    /// Why a check has no result: its run took too long. Time says nothing about the simulator.
+    /// Why a check has no result: its run took too long, or a process failed. Neither says anything
+    /// about the simulator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_checked: Option<String>,
 }

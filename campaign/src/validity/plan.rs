@@ -13,7 +13,7 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 /// Number of samples at the beginning of each scenario that are always checked.
-const FIRST: u64 = 2;
+pub(crate) const ALWAYS_CHECKED: u64 = 2;
 
 /// Owner of the random stream that the checked samples are drawn from. It is not an actor of any
 /// scenario.
@@ -74,7 +74,7 @@ impl CheckPlan {
             return false;
         }
         let block = key.sample / self.one_in;
-        if key.sample < FIRST {
+        if key.sample < ALWAYS_CHECKED {
             return true;
         }
         // Each block has one checked sample, so that the block's number is the number of checked

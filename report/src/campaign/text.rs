@@ -149,7 +149,8 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
     }
     let checks = &counts.checks;
     if checks.not_checked > 0 {
-        writeln!(f, "  not checked: {}, because a check took too long", counted(checks.not_checked, "run"))?;
+        let runs = counted(checks.not_checked, "run");
+        writeln!(f, "  not checked: {runs}, because a check took too long, or its process failed")?;
     }
     if let Some(rate) = checks.flip_rate() {
         writeln!(
