@@ -101,6 +101,35 @@ impl Inference {
     }
 }
 
+/// What driving with a system costs: in one sample, summed over samples, or in the mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// Time lost (s).
+    pub time_lost_s: f64,
+    /// Largest speed deficit of the ego to the lead vehicle (m/s).
+    pub speed_deficit_mps: f64,
+    /// Hardest braking of the vehicle behind (m/s²).
+    pub imposed_braking_mps2: f64,
+}
+
+impl Cost {
+    fn add(&mut self, other: Self) {
+        self.time_lost_s += other.time_lost_s;
+        self.speed_deficit_mps += other.speed_deficit_mps;
+        self.imposed_braking_mps2 += other.imposed_braking_mps2;
+    }
+
+    /// Returns the mean of a sum over `samples` samples.
+    fn mean(self, samples: u64) -> Self {
+        let samples = samples as f64;
+        Self {
+            time_lost_s: self.time_lost_s / samples,
+            speed_deficit_mps: self.speed_deficit_mps / samples,
+            imposed_braking_mps2: self.imposed_braking_mps2 / samples,
+        }
+    }
+}
+
 /// The counts of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmCounts {
@@ -137,9 +166,8 @@ pub struct ArmCounts {
     pub harm: f64,
     /// Samples whose cost is known.
     pub costed: u64,
-    /// Sums of the time lost (s), of the largest speed deficit (m/s), and of the hardest braking of
-    /// the vehicle behind (m/s²).
-    pub cost: [f64; 3],
+    /// Sum of the costs of these samples.
+    pub cost: Cost,
 }
 
 /// The result of one sample in one arm.
@@ -170,9 +198,8 @@ pub struct Tally {
     pub delta_v_mps: f64,
     /// Harm of all collisions, of the ego and of others.
     pub harm: f64,
-    /// Time lost (s), largest speed deficit (m/s), and hardest braking of the vehicle behind
-    /// (m/s²); `None` in a journal without them.
-    pub cost: Option<[f64; 3]>,
+    /// The cost; `None` in a journal without it.
+    pub cost: Option<Cost>,
 }
 
 impl ArmCounts {
@@ -197,7 +224,7 @@ impl ArmCounts {
         self.harm += tally.harm;
         if let Some(cost) = tally.cost {
             self.costed += 1;
-            self.add_cost(cost);
+            self.cost.add(cost);
         }
     }
 
@@ -217,17 +244,12 @@ impl ArmCounts {
         self.max_delta_v_mps = worse(self.max_delta_v_mps, other.max_delta_v_mps);
         self.harm += other.harm;
         self.costed += other.costed;
-        self.add_cost(other.cost);
+        self.cost.add(other.cost);
     }
 
-    fn add_cost(&mut self, cost: [f64; 3]) {
-        self.cost.iter_mut().zip(cost).for_each(|(sum, value)| *sum += value);
-    }
-
-    /// Returns the means of time lost (s), largest speed deficit (m/s) and hardest braking of the
-    /// vehicle behind (m/s²); `None` of no samples.
-    pub fn mean_cost(&self) -> Option<[f64; 3]> {
-        (self.costed > 0).then(|| self.cost.map(|sum| sum / self.costed as f64))
+    /// Returns the mean cost; `None` of no samples.
+    pub fn mean_cost(&self) -> Option<Cost> {
+        (self.costed > 0).then(|| self.cost.mean(self.costed))
     }
 
     /// Returns the share of the samples with a known cost in which the vehicle behind brakes harder

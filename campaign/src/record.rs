@@ -5,7 +5,7 @@ use closecall_scenarios::outcome::{IMPOSED_BRAKING_MPS2, Outcome};
 use closecall_simulation::SampleError;
 use serde::{Deserialize, Serialize};
 
-use super::ledger::Tally;
+use super::ledger::{Cost, Tally};
 use super::validity::ArmChecks;
 use closecall_scenarios::harm::harm;
 
@@ -108,8 +108,10 @@ impl ArmRecord {
                     jerk_mps3: outcome.margins.max_jerk_mps3,
                     delta_v_mps: outcome.ego_delta_v_mps().unwrap_or(0.0),
                     harm: harm(outcome),
-                    cost: outcome.cost.map(|cost| {
-                        [cost.time_lost_s, outcome.margins.max_speed_deficit_mps, cost.imposed_braking_mps2]
+                    cost: outcome.cost.map(|cost| Cost {
+                        time_lost_s: cost.time_lost_s,
+                        speed_deficit_mps: outcome.margins.max_speed_deficit_mps,
+                        imposed_braking_mps2: cost.imposed_braking_mps2,
                     }),
                 }
             }

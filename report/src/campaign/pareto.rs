@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use closecall_campaign::ledger::Cost;
 use closecall_campaign::summary::{Counts, Summary};
 
 /// The effects and the cost of an arm.
@@ -11,16 +12,17 @@ struct Standing<'a> {
     arm: &'a str,
     prevented: u64,
     induced: u64,
-    /// Means over the samples of the time lost (s), of the largest speed deficit (m/s), and of the
-    /// hardest braking of the vehicle behind (m/s²).
-    cost: [f64; 3],
+    /// The mean over the samples.
+    cost: Cost,
 }
 
 impl Standing<'_> {
     /// Returns true if this arm prevents as much as `other`, induces no more, and costs no more. A
     /// value that is not a number makes the answer false.
     fn is_as_good_as(&self, other: &Self) -> bool {
-        let costs_no_more = self.cost.iter().zip(other.cost).all(|(cost, other)| *cost <= other);
+        let costs_no_more = self.cost.time_lost_s <= other.cost.time_lost_s
+            && self.cost.speed_deficit_mps <= other.cost.speed_deficit_mps
+            && self.cost.imposed_braking_mps2 <= other.cost.imposed_braking_mps2;
         self.prevented >= other.prevented && self.induced <= other.induced && costs_no_more
     }
 }
@@ -28,10 +30,10 @@ impl Standing<'_> {
 /// Writes the prevented and induced collisions and the cost of each arm.
 impl fmt::Display for Standing<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [lost_s, slower_mps, imposed_mps2] = self.cost;
+        let Cost { time_lost_s, speed_deficit_mps, imposed_braking_mps2 } = self.cost;
         write!(
             f,
-            "{}: {} prevented, {} induced, {lost_s:.1} s late, {slower_mps:.1} m/s slower, the vehicle behind brakes by {imposed_mps2:.1} m/s²",
+            "{}: {} prevented, {} induced, {time_lost_s:.1} s late, {speed_deficit_mps:.1} m/s slower, the vehicle behind brakes by {imposed_braking_mps2:.1} m/s²",
             self.arm, self.prevented, self.induced
         )
     }
@@ -92,17 +94,25 @@ impl fmt::Display for ParetoText<'_> {
 mod tests {
     use super::*;
 
-    fn standing(arm: &str, prevented: u64, cost: [f64; 3]) -> Standing<'_> {
+    fn standing(arm: &str, prevented: u64, cost: Cost) -> Standing<'_> {
         Standing { arm, prevented, induced: 1, cost }
     }
 
     #[test]
     fn an_arm_adds_nothing_to_one_that_does_as_much_at_no_higher_cost() {
-        let tested = standing("mis", 70, [2.0, 8.0, 0.5]);
+        let cost = Cost { time_lost_s: 2.0, speed_deficit_mps: 8.0, imposed_braking_mps2: 0.5 };
+        let tested = standing("mis", 70, cost);
         let text = |reference| ParetoText { tested, references: vec![reference] }.to_string();
-        assert!(text(standing("gap", 70, [2.0, 8.0, 0.5])).contains("mis adds nothing to gap"));
-        assert!(text(standing("blind", 90, [3.0, 9.0, 0.5])).contains("no reference"), "it costs more");
-        assert!(text(standing("gap", 69, [0.0, 0.0, 0.0])).contains("no reference"), "it prevents less");
-        assert!(text(standing("gap", 90, [f64::NAN, 0.0, 0.0])).contains("no reference"), "nobody knows its cost");
+        assert!(text(standing("gap", 70, cost)).contains("mis adds nothing to gap"));
+        assert!(text(standing("gap", 69, Cost::default())).contains("no reference"), "it prevents less");
+        for higher in [
+            Cost { time_lost_s: 3.0, ..cost },
+            Cost { speed_deficit_mps: 9.0, ..cost },
+            Cost { imposed_braking_mps2: 0.6, ..cost },
+        ] {
+            assert!(text(standing("blind", 90, higher)).contains("no reference"), "it costs more: {higher:?}");
+        }
+        let unknown = Cost { time_lost_s: f64::NAN, ..Cost::default() };
+        assert!(text(standing("gap", 90, unknown)).contains("no reference"), "nobody knows its cost");
     }
 }

@@ -160,8 +160,8 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
         controller.insert("touches".to_owned(), json!(arm.touches));
         controller.insert("imposed_hard".to_owned(), json!(arm.imposed));
         controller.insert("imposed_hard_share".to_owned(), json!(arm.imposed_share()));
-        controller
-            .insert("mean_imposed_braking_mps2".to_owned(), json!(arm.mean_cost().map(|[.., mean_mps2]| mean_mps2)));
+        let mean_imposed_mps2 = arm.mean_cost().map(|cost| cost.imposed_braking_mps2);
+        controller.insert("mean_imposed_braking_mps2".to_owned(), json!(mean_imposed_mps2));
         controller.insert("collision_rate".to_owned(), json!(arm.collision_rate()));
         controller.insert("interval_95".to_owned(), json!(arm.interval_95(summary.inference)));
         if summary.inference == Inference::Design {
