@@ -147,7 +147,9 @@ pub(super) fn arms(size: Size) -> Result<String, Box<dyn Error>> {
     );
     for pair in counts.arm_pairs.iter().filter(|pair| pair.baseline == 0) {
         let (without, with) = (&counts.arms[0], &counts.arms[pair.tested]);
-        let means = with.cost.map(|sum| format!("{:.2}", sum / with.costed.max(1) as f64));
+        let mean = with.mean_cost().unwrap_or_default();
+        let means =
+            [mean.time_lost_s, mean.speed_deficit_mps, mean.imposed_braking_mps2].map(|mean| format!("{mean:.2}"));
         let cells = cells(&summary, [without, with], &pair.pairs);
         writeln!(text, "| `{}` | {cells} | {} |", summary.controllers[pair.tested], means.join(" | "))?;
     }
