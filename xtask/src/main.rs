@@ -11,6 +11,7 @@
 mod fit_object_sensors;
 mod fuzz_readers;
 mod make_trajectory_file;
+mod measure_controller;
 mod plot;
 mod plot_echo_widths;
 mod plot_regimes;
@@ -51,6 +52,8 @@ enum Task {
     FuzzReaders(Words),
     /// Generates a synthetic trajectory file of any size
     MakeTrajectoryFile(Words),
+    /// Measures a control step of a library or an FMU, without the loop around it
+    MeasureController(measure_controller::Args),
     /// Draws the predicted echo pulse widths of the LiDAR beside published ones
     PlotEchoWidths(Words),
     /// Draws the regimes of the Wiedemann 99 model
@@ -108,6 +111,7 @@ fn main() -> ExitCode {
         Task::FitObjectSensors(args) => fit_object_sensors::main(args).report(),
         Task::FuzzReaders(Words { words }) => fuzz_readers::main(words).report(),
         Task::MakeTrajectoryFile(Words { words }) => make_trajectory_file::main(words).report(),
+        Task::MeasureController(args) => measure_controller::main(&args).report(),
         Task::PlotEchoWidths(Words { words }) => plot_echo_widths::main(words).report(),
         Task::PlotRegimes(Words { words }) => plot_regimes::main(words).report(),
         Task::RenderAerial(Words { words }) => render_aerial::main(words).report(),

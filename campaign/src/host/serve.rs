@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use closecall_controllers::ControllerError;
 use closecall_controllers::external::{
-    Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, use_unpacked, watch,
+    Kind, Loaded, VariableTable, Variables, bridge, unload_all, use_unpacked, watch,
 };
 use closecall_scenarios::ScenarioFile;
 use closecall_sensors::camera::{Backend, Classifier};
@@ -28,11 +28,6 @@ use crate::workers::Samples;
 /// The answer of a process that has loaded ONNX Runtime.
 const ONNXRUNTIME_WORKS: &str = "onnxruntime";
 
-/// Number of tracks in the measurement of a control step: dense traffic.
-const COST_TRACKS: usize = 12;
-/// Number of control steps of the measurement.
-const COST_STEPS: u32 = 200_000;
-
 /// Runs a worker process with the arguments after `closecall host`, and returns what went wrong.
 ///
 /// | arguments | what the process does |
@@ -44,7 +39,6 @@ const COST_STEPS: u32 = 200_000;
 /// | `probe-perception PATH` | loads the library of a perception, and writes what it is |
 /// | `perceive PATH` | answers scans, with the protocol of perception processes |
 /// | `onnxruntime PATH` | loads ONNX Runtime and the network |
-/// | `cost lib:PATH` | measures a control step, and writes its mean wall time |
 ///
 /// # Errors
 /// The message of the failure.
@@ -79,13 +73,6 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
             let loaded = Loaded::open(kind, Path::new(path)).map_err(|error| error.to_string())?;
             bridge::serve((&loaded, &table), requests, answers)
         }
-        ["cost", controller] => {
-            let (kind, path) = file(controller)?;
-            let loaded = Loaded::open(kind, Path::new(path)).map_err(|error| error.to_string())?;
-            let step_s = cost::step_s(&loaded, COST_TRACKS, COST_STEPS)?;
-            writeln!(answers, "{controller}: {:.3} µs per control step", 1e6 * step_s)
-                .map_err(|error| error.to_string())
-        }
         ["probe-perception", path] => probe_library(Path::new(path), answers),
         ["perceive", path] => serve_library(Path::new(path), requests, answers),
         // Loading it runs its code.
@@ -95,7 +82,7 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
             writeln!(answers, "{ONNXRUNTIME_WORKS}").map_err(|error| error.to_string())
         }
         ["samples"] => samples(requests, &Arc::new(Mutex::new(answers))),
-        _ => Err("expected `samples`, or `probe`, `step` or `cost` with a controller such as `lib:PATH`".to_owned()),
+        _ => Err("expected `samples`, or `probe` or `step` with a controller such as `lib:PATH`".to_owned()),
     }
 }
 
