@@ -60,16 +60,24 @@ pub(super) enum UsedRoad<'a> {
     Only,
 }
 
-/// Reads the road that a scenario uses.
-///
-/// # Errors
-/// [`ImportError`] if the document is no OpenDRIVE, has a number that no road has, or has no such
-/// road or no such lane.
-pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<ImportedRoad, ImportError> {
-    let root = parse(path, text)?;
-    if root.name != "OpenDRIVE" {
-        return Err(root.error(path, "the root element must be `OpenDRIVE`"));
-    }
+/// A driving lane of the file.
+#[derive(Clone, Copy, Debug)]
+struct DrivingLane {
+    id: i32,
+    width_m: f64,
+}
+
+/// A place along a road.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Distance from the start of the road (m).
+    s_m: f64,
+    /// Distance from the start of the lane section (m).
+    within_section_m: f64,
+}
+
+/// Returns the road of a network that the scenario uses.
+fn used_road<'a>(path: &Path, root: &'a Node, used: &UsedRoad<'_>) -> Result<&'a Node, ImportError> {
     let mut ids = BTreeSet::new();
     for road in root.all("road") {
         if let Some(id) = road.raw("id")
@@ -87,14 +95,78 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
             return Err(root.error(path, message));
         }
     };
-    let Some(road) = root.all("road").find(|road| road.raw("id") == Some(road_id)) else {
+    root.all("road").find(|road| road.raw("id") == Some(road_id)).ok_or_else(|| {
         let named = if roads.is_empty() { "none".to_owned() } else { roads.join(", ") };
         let message = format!("there is no road `{road_id}` in {}, only {named}", path.display());
-        return Err(match used {
+        match used {
             UsedRoad::Lane { reader, position, .. } => reader.error(position, message),
             UsedRoad::Only => root.error(path, message),
-        });
+        }
+    })
+}
+
+/// Returns the driving lanes on one side of a lane section, in the order of the file, with their
+/// widths at a place.
+fn driving_lanes(
+    path: &Path,
+    along: &Node,
+    place: Place,
+    used: &UsedRoad<'_>,
+) -> Result<Vec<DrivingLane>, ImportError> {
+    let mut driving: Vec<DrivingLane> = Vec::new();
+    for node in along.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
+        let id = number(path, node, "id")?;
+        let Some(width) = node.child("width") else { return Err(node.error(path, "it has no `width`")) };
+        number(path, width, "a")?;
+        let width_m = width_m(node, place.within_section_m);
+        #[expect(clippy::cast_possible_truncation, reason = "a small whole number, as `shape::check` has checked")]
+        let id = id as i32;
+        let is_used = matches!(used, UsedRoad::Lane { lane, .. } if *lane == id);
+        if is_used && !Road::LANE_WIDTH_M.contains(width_m) {
+            let message = format!("at {} m it is {width_m}; a lane of a scenario has a width of 2.5 to 5 m", place.s_m);
+            return Err(width.error(path, message));
+        }
+        if driving.iter().any(|other| other.id == id) {
+            return Err(node.error(path, format!("a lane before it has the number {id} already")));
+        }
+        driving.push(DrivingLane { id, width_m });
+    }
+    Ok(driving)
+}
+
+/// Returns the driving lane that the scenario uses. `along` holds the lanes of one side.
+fn used_lane(
+    path: &Path,
+    along: &Node,
+    driving: &[DrivingLane],
+    used: &UsedRoad<'_>,
+) -> Result<DrivingLane, ImportError> {
+    let used_lane = match used {
+        UsedRoad::Lane { lane, .. } => driving.iter().find(|other| other.id == *lane),
+        UsedRoad::Only => driving.iter().find(|other| Road::LANE_WIDTH_M.contains(other.width_m)),
     };
+    used_lane.copied().ok_or_else(|| match used {
+        UsedRoad::Lane { road_id, lane, reader, position } => {
+            let lanes: Vec<_> = driving.iter().map(|other| other.id.to_string()).collect();
+            let named = if lanes.is_empty() { "none".to_owned() } else { lanes.join(", ") };
+            let place = format!("on the {} of road {road_id} in {}", along.name, path.display());
+            reader.error(position, format!("lane {lane} is not a driving lane {place}, only {named}"))
+        }
+        UsedRoad::Only => along.error(path, "none of its lanes is a driving lane with a width of 2.5 to 5 m"),
+    })
+}
+
+/// Reads the road that a scenario uses.
+///
+/// # Errors
+/// [`ImportError`] if the document is no OpenDRIVE, has a number that no road has, or has no such
+/// road or no such lane.
+pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<ImportedRoad, ImportError> {
+    let root = parse(path, text)?;
+    if root.name != "OpenDRIVE" {
+        return Err(root.error(path, "the root element must be `OpenDRIVE`"));
+    }
+    let road = used_road(path, &root, used)?;
     let length_m = shape::check(path, road)?;
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
     let Some(first) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
@@ -110,73 +182,43 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     let sections = LaneSections::read(path, lanes, side);
     // The place that gives the lanes: the start of a vehicle, or of a road with an acceleration
     // lane.
-    let (section, at_m) = match (used, &entry) {
+    let (section, s_m) = match (used, &entry) {
         (UsedRoad::Lane { reader, position, .. }, None) => {
             let s_m = reader.number(position, "s")?;
             (lanes.all("laneSection").nth(sections.at(s_m)).unwrap_or(first), s_m)
         }
         _ => (first, 0.0),
     };
-    let within_m = (at_m - start_m(section)).max(0.0);
+    let place = Place { s_m, within_section_m: (s_m - start_m(section)).max(0.0) };
     if sections.differ() && entry.is_none() {
-        notes.push(format!("lanes that begin or end: the lane section at {at_m} m gives the lanes"));
+        notes.push(format!("lanes that begin or end: the lane section at {s_m} m gives the lanes"));
     }
     let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
-    let mut driving: Vec<(i32, f64)> = Vec::new();
-    for node in along.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
-        let id = number(path, node, "id")?;
-        let Some(width) = node.child("width") else { return Err(node.error(path, "it has no `width`")) };
-        number(path, width, "a")?;
-        let width_m = width_m(node, within_m);
-        #[expect(clippy::cast_possible_truncation, reason = "a small whole number, as `shape::check` has checked")]
-        let id = id as i32;
-        let is_lane = matches!(used, UsedRoad::Lane { lane, .. } if *lane == id);
-        if is_lane && !Road::LANE_WIDTH_M.contains(width_m) {
-            let message = format!("at {at_m} m it is {width_m}; a lane of a scenario has a width of 2.5 to 5 m");
-            return Err(width.error(path, message));
-        }
-        if driving.iter().any(|(other, _)| *other == id) {
-            return Err(node.error(path, format!("a lane before it has the number {id} already")));
-        }
-        driving.push((id, width_m));
-    }
+    let mut driving = driving_lanes(path, along, place, used)?;
     // The acceleration lane may begin in a later section.
-    let first_entry = entry.filter(|entry| driving.iter().all(|(id, _)| *id != entry.id));
-    let last_width_m = first_entry.and_then(|_| driving.iter().max_by_key(|lane| lane.0.abs())).map(|lane| lane.1);
-    driving.extend(first_entry.map(|entry| (entry.id, entry.width_m)));
-    driving.sort_by_key(|lane| std::cmp::Reverse(lane.0));
-    let used_lane = match used {
-        UsedRoad::Lane { lane, .. } => driving.iter().find(|(id, _)| id == lane),
-        UsedRoad::Only => driving.iter().find(|(_, width_m)| Road::LANE_WIDTH_M.contains(*width_m)),
-    };
-    let Some(&(used_lane, lane_width_m)) = used_lane else {
-        let lanes: Vec<_> = driving.iter().map(|(id, _)| id.to_string()).collect();
-        return Err(match used {
-            UsedRoad::Lane { lane, reader, position, .. } => {
-                let named = if lanes.is_empty() { "none".to_owned() } else { lanes.join(", ") };
-                let place = format!("on the {side} of road {road_id} in {}", path.display());
-                reader.error(position, format!("lane {lane} is not a driving lane {place}, only {named}"))
-            }
-            UsedRoad::Only => along.error(path, "none of its lanes is a driving lane with a width of 2.5 to 5 m"),
-        });
-    };
+    let later_entry = entry.filter(|entry| driving.iter().all(|lane| lane.id != entry.id));
+    let outermost = driving.iter().max_by_key(|lane| lane.id.abs()).copied();
+    driving.extend(later_entry.map(|entry| DrivingLane { id: entry.id, width_m: entry.width_m }));
+    driving.sort_by_key(|lane| std::cmp::Reverse(lane.id));
+    let used_lane = used_lane(path, along, &driving, used)?;
+    let lane_width_m = used_lane.width_m;
     if !LANES.contains(&driving.len()) {
         let message = format!("it has {} driving lanes; a scenario has 1 to 8", driving.len());
         return Err(along.error(path, message));
     }
     if along.all("lane").any(changes_width) {
-        notes.push(format!("lanes whose width changes: each has the width at {at_m} m"));
+        notes.push(format!("lanes whose width changes: each has the width at {s_m} m"));
     }
-    if driving.iter().any(|(_, width)| *width != lane_width_m) {
+    if driving.iter().any(|lane| lane.width_m != lane_width_m) {
         notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
     }
     if changes(lanes, "laneOffset") {
-        notes.push(format!("a lane offset that changes: the lanes have the offset at {at_m} m"));
+        notes.push(format!("a lane offset that changes: the lanes have the offset at {s_m} m"));
     }
     let speed_limit_mps = speed_limits(path, road, &mut notes)?;
-    let mut centres_m = centres_m(lanes, along, (&driving, [at_m, within_m]));
-    if let (Some(entry), Some(width_m)) = (first_entry, last_width_m) {
-        let to_centre_m = 0.5 * (width_m + entry.width_m);
+    let mut centres_m = centres_m(lanes, along, &driving, place);
+    if let (Some(entry), Some(outermost)) = (later_entry, outermost) {
+        let to_centre_m = 0.5 * (outermost.width_m + entry.width_m);
         match (is_left_hand, centres_m.first().copied(), centres_m.last().copied()) {
             (true, Some(first_m), _) => centres_m.insert(0, first_m + to_centre_m),
             (false, _, Some(last_m)) => centres_m.push(last_m - to_centre_m),
@@ -184,16 +226,15 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         }
     }
     // The lane of the ego keeps its place, also if other lanes have other widths.
-    let used_index = driving.iter().position(|lane| lane.0 == used_lane).unwrap_or_default();
+    let used_index = driving.iter().position(|lane| lane.id == used_lane.id).unwrap_or_default();
     let centre_m = centres_m.get(used_index).copied().unwrap_or_default();
     let left_edge_m = centre_m + (used_index as f64 + 0.5) * lane_width_m;
     let alignment_d_m = (-left_edge_m * 1e9).round() / 1e9 + 0.0;
-    let (curvature_per_m, alignment) = curvature(path, (road, alignment_d_m), &mut notes)?;
-    let lanes = driving.into_iter().map(|(id, _)| id).collect();
-    let line = reference_line(path, (road, length_m), curvature_per_m, alignment);
-    let id = road_id.to_owned();
+    let (curvature_per_m, alignment) = curvature(path, road, alignment_d_m, &mut notes)?;
+    let lanes = driving.iter().map(|lane| lane.id).collect();
+    let line = reference_line(path, road, length_m, curvature_per_m, alignment);
     Ok(ImportedRoad {
-        id,
+        id: road.raw("id").unwrap_or_default().to_owned(),
         is_left_hand,
         length_m,
         lanes,
@@ -220,43 +261,43 @@ fn start_m(section: &Node) -> f64 {
     value(section, "s")
 }
 
-/// Returns the value at a place of the polynomials of a name (m), whose starts are the attribute
-/// `from`.
-fn polynomial_m(parent: &Node, (name, from): (&str, &str), at_m: f64) -> f64 {
+/// Returns the value at a place of the polynomials of a name (m). The attribute `start` says where
+/// each of them begins.
+fn polynomial_m(parent: &Node, name: &str, start: &str, at_m: f64) -> f64 {
     let pieces: Vec<&Node> = parent.all(name).collect();
-    let last = pieces.iter().rev().find(|piece| value(piece, from) <= at_m).or(pieces.first());
+    let last = pieces.iter().rev().find(|piece| value(piece, start) <= at_m).or(pieces.first());
     last.map_or(0.0, |piece| {
-        let x = (at_m - value(piece, from)).max(0.0);
+        let x = (at_m - value(piece, start)).max(0.0);
         let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| value(piece, name));
         a + x * (b + x * (c + x * d))
     })
 }
 
 /// Returns the width of a lane at a distance from the start of its section (m).
-fn width_m(lane: &Node, within_m: f64) -> f64 {
-    polynomial_m(lane, ("width", "sOffset"), within_m).max(0.0)
+fn width_m(lane: &Node, within_section_m: f64) -> f64 {
+    polynomial_m(lane, "width", "sOffset", within_section_m).max(0.0)
 }
 
 /// Returns the centres of driving lanes to the left of the reference line (m), from the left.
-/// `along` holds the lanes of one side. The place is given from the start of the road and of the
-/// section (m).
-fn centres_m(lanes: &Node, along: &Node, (driving, [at_m, within_m]): (&[(i32, f64)], [f64; 2])) -> Vec<f64> {
+/// `along` holds the lanes of one side.
+fn centres_m(lanes: &Node, along: &Node, driving: &[DrivingLane], place: Place) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, reason = "as the lanes that they are compared with")]
-    let of_lane = |lane: &Node| (value(lane, "id") as i32, width_m(lane, within_m));
-    let mut widths: Vec<(i32, f64)> = along.all("lane").map(of_lane).collect();
+    let of_node =
+        |node: &Node| DrivingLane { id: value(node, "id") as i32, width_m: width_m(node, place.within_section_m) };
+    let mut all: Vec<DrivingLane> = along.all("lane").map(of_node).collect();
     // From the reference line outwards.
-    widths.sort_by_key(|lane| lane.0.unsigned_abs());
-    let mut from_m = polynomial_m(lanes, ("laneOffset", "s"), at_m);
+    all.sort_by_key(|lane| lane.id.unsigned_abs());
+    let mut from_m = polynomial_m(lanes, "laneOffset", "s", place.s_m);
     let mut centres_m = Vec::new();
-    for (id, width_m) in widths {
-        let to_m = from_m + width_m * f64::from(id.signum());
-        if driving.iter().any(|(other, _)| *other == id) {
-            centres_m.push((id, 0.5 * (from_m + to_m)));
+    for lane in all {
+        let to_m = from_m + lane.width_m * f64::from(lane.id.signum());
+        if driving.iter().any(|other| other.id == lane.id) {
+            centres_m.push((lane.id, 0.5 * (from_m + to_m)));
         }
         from_m = to_m;
     }
-    centres_m.sort_by_key(|lane| std::cmp::Reverse(lane.0));
-    centres_m.dedup_by_key(|lane| lane.0);
+    centres_m.sort_by_key(|(id, _)| std::cmp::Reverse(*id));
+    centres_m.dedup_by_key(|(id, _)| *id);
     centres_m.into_iter().map(|(_, centre_m)| centre_m).collect()
 }
 
@@ -264,7 +305,8 @@ fn centres_m(lanes: &Node, along: &Node, (driving, [at_m, within_m]): (&[(i32, f
 /// course of the imported road, or the file does not say where it begins.
 fn reference_line(
     path: &Path,
-    (road, length_m): (&Node, f64),
+    road: &Node,
+    length_m: f64,
     curvature_per_m: f64,
     alignment: Option<Alignment>,
 ) -> Option<ReferenceLine> {
@@ -291,7 +333,8 @@ fn reference_line(
 /// lanes. If no alignment follows the road, returns the curvature of a straight road with a note.
 fn curvature(
     path: &Path,
-    (road, beside_m): (&Node, f64),
+    road: &Node,
+    beside_m: f64,
     notes: &mut Vec<String>,
 ) -> Result<(f64, Option<Alignment>), ImportError> {
     let plan = road.child("planView").ok_or_else(|| road.error(path, "it has no `planView`"))?;
