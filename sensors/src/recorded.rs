@@ -69,7 +69,7 @@ impl RecordedPerception {
         (road, ego): (&Road, VehicleState),
     ) -> Result<usize, RecordedScanError> {
         let motion = ScanMotion { speed_mps: ego.speed_mps, yaw_rate_radps: ego.yaw_rate_radps };
-        let (scan, outside) = points.into_scan(&self.lidars[sensor], (self.frame, self.ego_length_m), motion)?;
+        let (scan, outside) = points.into_scan(&self.lidars[sensor], self.frame, self.ego_length_m, motion)?;
         self.chain.take_recorded(sensor, &scan, (road, ego))?;
         Ok(outside)
     }

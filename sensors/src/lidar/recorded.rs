@@ -183,7 +183,8 @@ impl RecordedPoints {
     pub(crate) fn into_scan(
         mut self,
         lidar: &Lidar,
-        (frame, ego_length_m): (PointFrame, f64),
+        frame: PointFrame,
+        ego_length_m: f64,
         motion: ScanMotion,
     ) -> Result<(LidarScan, usize), PointError> {
         self.check(lidar)?;
@@ -207,9 +208,9 @@ impl RecordedPoints {
             self.beam = Some(beams.into_iter().flatten().collect());
         }
         let beam = self.beam.take().unwrap_or_default();
-        let (start, offset_ns) = self.timed(lidar, pattern, &beam);
+        let (start, offset_ns) = self.start_and_offsets(lidar, pattern, &beam);
         if frame == PointFrame::Sensor {
-            self.turn_to_ego_frame(&mounting, motion, (start, &offset_ns));
+            self.turn_to_ego_frame(&mounting, motion, start, &offset_ns);
         }
         let mut resolution = lidar.kind.resolution;
         resolution.mount_height_m = lidar.mount_height_m;
@@ -271,7 +272,7 @@ impl RecordedPoints {
     /// Returns the start of the scan and the time of each point after it (ns). A sweep of the
     /// pattern ends with the scan; a point before it makes the scan longer.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1 s")]
-    fn timed(&mut self, lidar: &Lidar, pattern: &Pattern, beam: &[u16]) -> (Time, Vec<u32>) {
+    fn start_and_offsets(&mut self, lidar: &Lidar, pattern: &Pattern, beam: &[u16]) -> (Time, Vec<u32>) {
         let start = self.end - Time::from_ns(lidar.kind.sweep_ns as i64);
         match std::mem::take(&mut self.times) {
             PointTimes::SinceStart(offset_ns) => (start, offset_ns),
@@ -291,7 +292,7 @@ impl RecordedPoints {
     /// Moves the points from the sensor's frame when they were measured to the ego's frame at the
     /// end of the scan.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    fn turn_to_ego_frame(&mut self, mounting: &Mounting, motion: ScanMotion, (start, offset_ns): (Time, &[u32])) {
+    fn turn_to_ego_frame(&mut self, mounting: &Mounting, motion: ScanMotion, start: Time, offset_ns: &[u32]) {
         let ego_from_sensor = mounting.sensor_from_ego.inverse();
         for (point, &offset_ns) in offset_ns.iter().enumerate() {
             let seen_m = Vector3::from(std::array::from_fn(|axis| f64::from(self.at_m[axis][point])));
@@ -339,24 +340,15 @@ fn beam_towards(seen_m: &Vector3<f64>, pattern: &Pattern, mirror_side: MirrorSid
     let columns = &kind.azimuths_deg;
     let near = columns.partition_point(|column_deg| *column_deg < azimuth_deg).min(columns.len() - 1);
     let beam_of = |column: usize, layer: usize| u16::try_from(column * layers + layer).ok();
-    let apart = |beam: Option<u16>, is_azimuth: bool| {
-        beam.map_or(f64::INFINITY, |beam| {
-            let (beam_azimuth_rad, beam_elevation_rad) = pattern.direction_rad(mirror_side, beam);
-            match is_azimuth {
-                true => (beam_azimuth_rad - azimuth_deg.to_radians()).abs(),
-                false => (beam_elevation_rad - elevation_rad).abs(),
-            }
-        })
+    let direction_rad = |column: usize, layer: usize| match beam_of(column, layer) {
+        Some(beam) => pattern.direction_rad(mirror_side, beam),
+        None => (f64::INFINITY, f64::INFINITY),
     };
-    let layer = (0..layers).min_by(|&a, &b| {
-        let [a, b] = [a, b].map(|layer| apart(beam_of(near, layer), false));
-        a.total_cmp(&b)
-    })?;
+    let elevation_error = |layer: usize| (direction_rad(near, layer).1 - elevation_rad).abs();
+    let layer = (0..layers).min_by(|&a, &b| elevation_error(a).total_cmp(&elevation_error(b)))?;
+    let azimuth_error = |column: usize| (direction_rad(column, layer).0 - azimuth_deg.to_radians()).abs();
     let columns = near.saturating_sub(SHIFTED_COLUMNS + 1)..(near + SHIFTED_COLUMNS).min(columns.len());
-    let column = columns.min_by(|&a, &b| {
-        let [a, b] = [a, b].map(|column| apart(beam_of(column, layer), true));
-        a.total_cmp(&b)
-    })?;
+    let column = columns.min_by(|&a, &b| azimuth_error(a).total_cmp(&azimuth_error(b)))?;
     beam_of(column, layer)
 }
 
@@ -376,7 +368,7 @@ mod tests {
     #[test]
     fn a_point_in_the_sensor_s_frame_is_behind_the_ego_and_has_the_beam_of_its_direction() {
         let lidar = Lidar::default();
-        let (scan, outside) = points().into_scan(&lidar, (PointFrame::Sensor, 4.6), ScanMotion::default()).unwrap();
+        let (scan, outside) = points().into_scan(&lidar, PointFrame::Sensor, 4.6, ScanMotion::default()).unwrap();
         assert_eq!((scan.len(), outside), (2, 1));
         assert!((scan.x_m[0] + 22.3).abs() < 1e-5 && scan.y_m[0].abs() < 1e-5 && (scan.z_m[0] - 0.7).abs() < 1e-5);
         // The left of a sensor that looks back is the right of the ego.
@@ -394,9 +386,8 @@ mod tests {
     fn the_motion_of_the_ego_moves_a_point_by_its_age() {
         let times = PointTimes::Absolute(vec![0.02, 0.12, 0.12]);
         let moving = ScanMotion { speed_mps: 30.0, yaw_rate_radps: 0.0 };
-        let (scan, _) = RecordedPoints { times, ..points() }
-            .into_scan(&Lidar::default(), (PointFrame::Sensor, 4.6), moving)
-            .unwrap();
+        let (scan, _) =
+            RecordedPoints { times, ..points() }.into_scan(&Lidar::default(), PointFrame::Sensor, 4.6, moving).unwrap();
         // In 0.1 s the ego has driven 3 m away from the first point.
         assert!((scan.x_m[0] + 25.3).abs() < 1e-4, "{}", scan.x_m[0]);
         assert_eq!((scan.start, scan.offset_ns[0]), (Time::from_ms(20), 0));
@@ -405,7 +396,7 @@ mod tests {
     #[test]
     fn a_value_that_is_not_finite_a_foreign_beam_and_a_time_outside_of_the_scan_are_refused() {
         let refused = |points: RecordedPoints| {
-            let result = points.into_scan(&Lidar::default(), (PointFrame::Ego, 4.6), ScanMotion::default());
+            let result = points.into_scan(&Lidar::default(), PointFrame::Ego, 4.6, ScanMotion::default());
             result.map(drop).unwrap_err().to_string()
         };
         let mut wrong = points();
