@@ -56,8 +56,8 @@ impl EncounterComparison {
     /// Returns the name of each metric with its text for the recorded encounter and for the
     /// simulated run.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, [String; 2])> {
-        ROWS.iter().map(|(name, unit, metric)| {
-            let text = |course| match metric(course) {
+        ROWS.iter().map(|Row { name, unit, metric }| {
+            let text = |metrics| match metric(metrics) {
                 Ok(value) => format!("{value:.2} {unit}"),
                 Err(Absent::NeverCrossed) => "never".to_owned(),
                 Err(_) => "-".to_owned(),
@@ -109,16 +109,20 @@ impl EncounterComparison {
     }
 }
 
-/// A metric of the comparison: its name, its unit, and the function that reads it.
-type Row = (&'static str, &'static str, fn(&EncounterMetrics) -> Measured);
+/// A metric of the comparison.
+struct Row {
+    name: &'static str,
+    unit: &'static str,
+    metric: fn(&EncounterMetrics) -> Measured,
+}
 
 const ROWS: [Row; 6] = [
-    ("R crosses the marking at", "s", |course| course.crossing_s),
-    ("E's headway to F then", "s", |course| course.thw_front_at_crossing_s),
-    ("R's headway to E then", "s", |course| course.thw_rear_at_crossing_s),
-    ("E's hardest braking until then", "m/s²", |course| Ok(course.max_deceleration_mps2)),
-    ("E's smallest headway until then", "s", |course| course.min_thw_front_s),
-    ("R's smallest headway until then", "s", |course| course.min_thw_rear_s),
+    Row { name: "R crosses the marking at", unit: "s", metric: |metrics| metrics.crossing_s },
+    Row { name: "E's headway to F then", unit: "s", metric: |metrics| metrics.thw_front_at_crossing_s },
+    Row { name: "R's headway to E then", unit: "s", metric: |metrics| metrics.thw_rear_at_crossing_s },
+    Row { name: "E's hardest braking until then", unit: "m/s²", metric: |metrics| Ok(metrics.max_deceleration_mps2) },
+    Row { name: "E's smallest headway until then", unit: "s", metric: |metrics| metrics.min_thw_front_s },
+    Row { name: "R's smallest headway until then", unit: "s", metric: |metrics| metrics.min_thw_rear_s },
 ];
 
 impl EncounterMetrics {
