@@ -4,7 +4,7 @@
 //! back. Such an ego also slows down if nobody is behind, or if the vehicles behind it do not
 //! approach. In scenarios with the requirement `MIS-9`, some samples therefore run twice more,
 //! while nothing happens ahead: without the vehicles that start behind the ego, and with these
-//! vehicles at no more than the speed of the ego. If the ego slows down in such a run by more than
+//! vehicles so little faster than the ego that it is no approach. If the ego slows down in such a run by more than
 //! the baseline does, it misses the requirement. The time at which it begins to slow down does not
 //! matter.
 
@@ -73,7 +73,7 @@ impl Attribution {
         let Self { runs, slowed, most_mps } = self;
         format!(
             "if no vehicle behind it approaches, the ego still slows down by up to {most_mps:.1} m/s, or its controller fails, in {slowed} of \
-             {runs} checked samples (at most {} of all allowed): what it prevents is no answer to them",
+             {runs} checked samples (allowed: at most {}): the vehicles behind are not the reason",
             percent(MOST)
         )
     }

@@ -177,9 +177,10 @@ impl EndMonitor {
         if self.ending.is_some() { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     }
 
-    /// Ends a campaign that fails fast if `lost` has a gate that can only fail, with its scenario.
-    pub fn observe_gate(&mut self, lost: impl FnOnce() -> Option<(String, Expression)>) -> ControlFlow<End> {
-        let Some((scenario, expression)) = self.rule.fail_fast.then(lost).flatten() else {
+    /// Ends a campaign that fails fast if `lost_gate` returns a gate that can only fail, with the
+    /// name of its scenario.
+    pub fn observe_gate(&mut self, lost_gate: impl FnOnce() -> Option<(String, Expression)>) -> ControlFlow<End> {
+        let Some((scenario, expression)) = self.rule.fail_fast.then(lost_gate).flatten() else {
             return ControlFlow::Continue(());
         };
         self.ending = Some(EarlyEnd::Gate { scenario, expression });

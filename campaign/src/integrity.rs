@@ -178,10 +178,13 @@ fn resumption(folder: &Folder, manifest: &Manifest, command_for: CommandFor) -> 
 /// there.
 fn kind_of_no_file(path: &Path) -> Option<&'static str> {
     let kind = path.symlink_metadata().ok()?.file_type();
-    match () {
-        () if kind.is_file() => None,
-        () if kind.is_symlink() => Some("a symbolic link"),
-        () if kind.is_dir() => Some("a folder"),
-        () => Some("a named pipe, a socket or a device"),
+    if kind.is_file() {
+        None
+    } else if kind.is_symlink() {
+        Some("a symbolic link")
+    } else if kind.is_dir() {
+        Some("a folder")
+    } else {
+        Some("a named pipe, a socket or a device")
     }
 }

@@ -114,10 +114,12 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
         Err(error) => return Err(special_kind(path).map_or(error, refused)),
     };
     let kind = file.metadata()?.file_type();
-    match () {
-        () if kind.is_fifo() => Err(refused("a named pipe")),
-        () if kind.is_char_device() || kind.is_block_device() => Err(refused("a device")),
-        () => Ok(file),
+    if kind.is_fifo() {
+        Err(refused("a named pipe"))
+    } else if kind.is_char_device() || kind.is_block_device() {
+        Err(refused("a device"))
+    } else {
+        Ok(file)
     }
 }
 

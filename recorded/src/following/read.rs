@@ -152,10 +152,12 @@ impl<R: Read> Read for Bounded<R> {
             let message = format!("{subject} is longer than {} MiB, so this is not a file of pairs", most >> 20);
             Err(std::io::Error::new(std::io::ErrorKind::InvalidData, message))
         };
-        match () {
-            () if self.of_line > MOST_LINE_BYTES => fail("a line", MOST_LINE_BYTES),
-            () if self.read > MOST_BYTES => fail("the file", MOST_BYTES),
-            () => Ok(count),
+        if self.of_line > MOST_LINE_BYTES {
+            fail("a line", MOST_LINE_BYTES)
+        } else if self.read > MOST_BYTES {
+            fail("the file", MOST_BYTES)
+        } else {
+            Ok(count)
         }
     }
 }
