@@ -22,13 +22,13 @@ use super::saved::LimitArgs;
 #[derive(Clone, Debug, Default, Args, Deserialize)]
 #[serde(default)]
 pub(super) struct ControllerArgs {
-    /// Controller of the ego vehicle [default: the function that the scenario judges, `mis` in most]: `acc`, `mis`, `mis-ttce`, `mis-extended`,
+    /// Controller of the ego vehicle [default: the controller of the function that the scenario judges, in most scenarios `mis`]: `acc`, `mis`, `mis-ttce`, `mis-extended`,
     /// `acc-aeb`, `acc+aeb` and `cruise+aeb` (stacks whose functions are switched), `human-aeb` and `human+aeb` (the human driver
     /// that the scenario gives the ego), `blind` and `crawl` (slower from the start,
     /// without looking back), `gap-SECONDS` (cruise control with a longer time gap:
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
     /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a
-    /// program of your own, which reads a line per control step and answers with a line. A built-in one takes settings of its own:
+    /// program of your own, which reads a line per control step and answers with a line. A built-in controller takes settings of its own:
     /// `acc+aeb:aeb.trigger-mps2=5`
     #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", help_heading = heading::CONTROLLER)]
     #[serde(deserialize_with = "parsed_option")]

@@ -200,8 +200,7 @@ pub(super) struct MapArgs {
     /// Front time headways at the start
     #[arg(long, value_name = "S,…", value_delimiter = ',', value_parser = positive, default_value = "0.5,0.7,0.9,1.2", help_heading = heading::METHOD)]
     front_thw_s: Vec<f64>,
-    /// Engage at the gaps of the paper's system or of the extended one, and brake as strongly:
-    /// `mis` or `mis-extended`
+    /// System whose engagement gaps and braking the map shows: `mis` or `mis-extended`
     #[arg(long, default_value = "mis", help_heading = heading::CONTROLLER)]
     controller: ControllerChoice,
     /// Folder for the page, the pictures (SVG) and the points (CSV, JSON)

@@ -140,7 +140,7 @@ enum Command {
     Baseline(baseline::BaselineArgs),
     /// Run one sample of a campaign again, and check that it gives the same bits
     Replay(replay::ReplayArgs),
-    /// Find the stage of the chain that would prevent a failure of a campaign if it were perfect, and
+    /// Find the stage of the chain whose perfection would prevent a failure of a campaign, and say
     /// what the system did
     Explain(causes::ExplainArgs),
     /// Find the smallest failing case near a failing sample of a campaign, and the nearest case
@@ -149,7 +149,7 @@ enum Command {
     /// Explore the samples of a campaign in the browser, and open recordings in the installed Rerun
     /// viewer
     View(view::ViewArgs),
-    /// Draw an encounter as a static figure, SVG or PNG
+    /// Draw an encounter as a static figure: SVG, PNG or PDF
     Plot(plot::PlotArgs),
     /// Write a commented scenario to start from
     New(new::NewArgs),
@@ -286,13 +286,7 @@ fn allowed_number(error: &(dyn Error + 'static)) -> Option<String> {
             _ => "a whole number, 0 or more".to_owned(),
         });
     }
-    if error.is::<ParseFloatError>() {
-        return Some("a number, such as 0.5".to_owned());
-    }
-    // The parser of clap states its range as Rust writes it: `0 is not in 1..=10`.
-    let message = error.to_string();
-    let (least, largest) = message.split_once(" is not in ")?.1.split_once("..=")?;
-    Some(format!("a whole number from {least} to {largest}"))
+    error.is::<ParseFloatError>().then(|| "a number, such as 0.5".to_owned())
 }
 
 /// Runs the program with these arguments. The first is the program's name.

@@ -22,8 +22,8 @@ use crate::exit_code::ExitCode;
 #[derive(Clone, Copy, Debug, Default, Args, Deserialize)]
 #[serde(default)]
 pub(super) struct EndArgs {
-    /// End at the first failing sample: the ego collides under the controller under test, or a
-    /// controller ends in an error; or as soon as a gate can only fail. There is then no verdict
+    /// End as soon as the ego collides under the controller under test, a controller ends in an
+    /// error, or a gate can only fail. There is then no verdict
     #[arg(long, help_heading = heading::EXECUTION)]
     fail_fast: bool,
     /// End as soon as more than N samples have ended in an error. There is then no verdict

@@ -19,7 +19,7 @@ use crate::exit_code::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = examples([
     "closecall study fidelity full fast",
-    "closecall study fidelity closecall-results results/object",
+    "closecall study fidelity closecall-results closecall-results/fidelity",
     "closecall study fidelity full fast --format json",
 ]))]
 pub(super) struct FidelityArgs {

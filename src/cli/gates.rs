@@ -37,7 +37,7 @@ pub(super) struct GateArgs {
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_other_collisions: Option<u64>,
     /// Pass only if the samples show, for every scenario, that the probability of a collision of
-    /// the ego is at most P. The verdict is inconclusive if they show neither that nor the opposite
+    /// the ego is at most P. If they show neither this nor the opposite, the verdict is inconclusive
     #[arg(long, value_name = "P", help_heading = heading::GATES)]
     pub(super) max_probability: Option<Probability>,
     /// Confidence with which --max-probability is to be shown, above 0.5 and below 1 [default:

@@ -76,7 +76,7 @@ pub(super) enum Study {
     /// Count how often the encounter happens in trajectory files, and state the net effect of the
     /// system per 10^6 km
     Exposure(causes::ExposureArgs),
-    /// Sharpen the rates of a campaign with runs of the same samples, and more of them, with fast sensors
+    /// Narrow the intervals of a campaign's rates with a larger campaign of fast sensors
     Fidelity(fidelity::FidelityArgs),
     /// Study the rear sensors without a controller: detection, errors, classes and consistency over distance and conditions
     Sensors(sensors::SensorsArgs),

@@ -42,8 +42,7 @@ pub(super) struct MergeArgs {
     /// Folder for the whole campaign; it must be new or empty
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: PathBuf,
-    /// Write the whole campaign anew into a folder that holds it already, or a part of it after a
-    /// merge that was interrupted
+    /// Write the whole campaign anew into the folder of an earlier merge, finished or interrupted
     #[arg(long, help_heading = heading::OUTPUT)]
     resume: bool,
     /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows

@@ -108,6 +108,8 @@ pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {
 
 /// The placeholder in a CI job for an unknown value.
 const TO_FILL_IN: &str = "FILL-IN";
+/// The CI jobs, in the folder of the repository.
+const JOBS: [&str; 2] = [".github/workflows/closecall.yml", ".gitlab-ci.yml"];
 
 pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
     let url = args.url.as_deref().unwrap_or(TO_FILL_IN);
@@ -117,15 +119,12 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, CliError> {
         let advice = if is_new { String::new() } else { advice(&path, &text) };
         print_error(format_args!("{}: {}{advice}\n", if is_new { "written" } else { "kept" }, path.display()));
     }
-    let missing: Vec<&str> = [("CLOSECALL_URL", url), ("CLOSECALL_REV", rev)]
-        .into_iter()
-        .filter_map(|(name, value)| (value == TO_FILL_IN).then_some(name))
-        .collect();
+    // A job that was there already may have its values.
+    let jobs = JOBS.map(|job| std::fs::read_to_string(args.dir.join(job)).unwrap_or_default());
+    let is_missing = |name: &&str| jobs.iter().any(|job| job.contains(&format!("{name}: \"{TO_FILL_IN}\"")));
+    let missing: Vec<&str> = ["CLOSECALL_URL", "CLOSECALL_REV"].into_iter().filter(is_missing).collect();
     if !missing.is_empty() {
-        print_error(format_args!(
-            "fill in: {} in .github/workflows/closecall.yml and .gitlab-ci.yml\n",
-            missing.join(" and ")
-        ));
+        print_error(format_args!("fill in: {} in {}\n", missing.join(" and "), JOBS.join(" and ")));
     }
     let scenarios = args.dir.join(SCENARIOS);
     print_error(format_args!(

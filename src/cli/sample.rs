@@ -43,10 +43,10 @@ pub(super) struct SampleArgs {
     /// Parameter that varies: one of the Wiedemann 99 driver that changes lanes (`cc1`), or a path of keys in the scenario
     #[arg(long, value_name = "PARAMETER", help_heading = heading::METHOD)]
     vary: String,
-    /// Its first value [default: the calibrated one of step 0]
+    /// First value of the parameter [default: the calibrated value of step 0]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, help_heading = heading::METHOD)]
     from: Option<f64>,
-    /// Its last value
+    /// Last value of the parameter
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, help_heading = heading::METHOD)]
     to: f64,
     /// Number of values, in equal steps: 2 to 100

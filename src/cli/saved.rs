@@ -15,9 +15,8 @@ use super::output::print_error;
 /// Whether the code that a folder names may run.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct TrustArgs {
-    /// Run the controllers that the folder names (commands, libraries, FMUs) although another
-    /// machine or another user has written it, such as the artifact of a CI job. They are printed
-    /// first
+    /// Run the commands, libraries and FMUs that the folder names, although another machine or
+    /// another user has written it, as with the artifact of a CI job. The names are printed first
     #[arg(long, help_heading = heading::CONTROLLER)]
     trust_folder: bool,
 }
@@ -53,7 +52,7 @@ pub(super) fn refuse_rare(path: &Path) -> Result<(), CliError> {
 #[serde(default)]
 pub(super) struct LimitArgs {
     /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]. The
-    /// first may take 10 s
+    /// first answer may take 10 s
     #[arg(long, value_name = "MS", help_heading = heading::CONTROLLER)]
     controller_timeout_ms: Option<TimeoutMs>,
     /// Memory limit of the processes of an `exec`, `lib` or `fmu` controller [default: 1024]

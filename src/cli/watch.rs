@@ -61,14 +61,14 @@ pub(super) struct WatchArgs {
     /// Write the tracks of the same run: a table with one row per control step and track, with state, covariance, class, and the vehicle that it is matched with
     #[arg(long, value_name = "FILE.parquet", value_parser = parquet, help_heading = heading::OUTPUT)]
     pub(super) tracks: Option<PathBuf>,
-    /// Write the clusters and boxes of the LiDARs (mode `full`) of the same run before any is rejected: a table with what the tracker has made of each
+    /// Write the clusters and boxes of the LiDARs (mode `full`) of the same run before any is rejected: a table with the use that the tracker makes of each
     #[arg(long, value_name = "FILE.parquet", value_parser = parquet, help_heading = heading::OUTPUT)]
     pub(super) clusters: Option<PathBuf>,
     /// Write the same run as messages of ASAM OSI 3.8, `GroundTruth` and `SensorData` of each control step: one MCAP file with the map, or a
     /// trace file for each type, whose name begins with date and type and ends with the name of FILE
     #[arg(long, value_name = "FILE.mcap|FILE.osi", value_parser = osi_file, help_heading = heading::OUTPUT)]
     pub(super) osi: Option<PathBuf>,
-    /// Write the lanes in each `GroundTruth`, instead of the first one alone
+    /// Write the lanes into every `GroundTruth`, not only into the first
     #[arg(long, requires = "osi", help_heading = heading::OUTPUT)]
     pub(super) osi_lanes: bool,
 }
