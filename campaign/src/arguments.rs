@@ -47,6 +47,8 @@ checked_numbers! {
     Confidence(f64) by confidence;
     /// A share, 0 to 1.
     Share(f64) by share;
+    /// A share above 0, up to 1.
+    PositiveShare(f64) by positive_share;
     /// A number of worker threads.
     Jobs(u16) by whole::<u16, 1, 1_024>;
     /// A number of further tries of a sample.
@@ -58,7 +60,10 @@ checked_numbers! {
 }
 
 /// Parses a whole number within limits.
-fn whole<T: TryFrom<u64>, const LEAST: u64, const MOST: u64>(text: &str) -> Result<T, String> {
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn whole<T: TryFrom<u64>, const LEAST: u64, const MOST: u64>(text: &str) -> Result<T, String> {
     let number = text.parse().ok().filter(|number| (LEAST..=MOST).contains(number));
     let number = number.and_then(|number| T::try_from(number).ok());
     number.ok_or_else(|| format!("`{text}` is not a whole number from {LEAST} to {MOST}"))
@@ -120,7 +125,7 @@ impl FromStr for WallTime {
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err(format!("`{text}` is not a number above 0")),
+        _ => Err(format!("`{text}` is not a finite number above 0")),
     }
 }
 
@@ -130,8 +135,10 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// What is wrong, and what is allowed.
 pub fn count(text: &str) -> Result<u64, String> {
     let reason = match text.parse::<i128>() {
-        Ok(number) if number > 0 => return u64::try_from(number).map_err(|_| format!("`{text}` is too large")),
-        Ok(0) => "is none",
+        Ok(number) if number > 0 => {
+            return u64::try_from(number).map_err(|_| format!("`{text}` is too large: at most {} is allowed", u64::MAX));
+        }
+        Ok(0) => "is too small",
         Ok(_) => "is negative",
         Err(_) => "is not a whole number",
     };
@@ -177,6 +184,14 @@ pub fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
         _ => Err(format!("`{text}` is not a number from 0 to 1")),
+    }
+}
+
+/// Parses a share above 0, up to 1.
+fn positive_share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 1.0 => Ok(value),
+        _ => Err(format!("`{text}` is not a number above 0 and up to 1")),
     }
 }
 
@@ -248,7 +263,8 @@ pub fn sample_count(text: &str) -> Result<u64, String> {
 /// # Errors
 /// What is wrong, and what is allowed.
 pub fn scene_count(text: &str) -> Result<u32, String> {
-    u32::try_from(count(text)?).map_err(|_| format!("`{text}` is too large"))
+    let number = count(text)?;
+    u32::try_from(number).map_err(|_| format!("`{number}` is too large: at most {} is allowed", u32::MAX))
 }
 
 /// Parses the name of a scenario.
@@ -279,7 +295,7 @@ mod tests {
     fn a_count_is_a_whole_number_above_zero() {
         assert_eq!(count("200"), Ok(200));
         for (text, reason) in
-            [("-5", "is negative"), ("0", "`0` is none"), ("1.5", "not a whole number"), ("", "whole")]
+            [("-5", "is negative"), ("0", "`0` is too small"), ("1.5", "not a whole number"), ("", "whole")]
         {
             assert!(count(text).unwrap_err().contains(reason), "{text}");
         }
@@ -297,5 +313,9 @@ mod tests {
         }
         assert_eq!(serde_json::from_str::<Share>("0.1").unwrap(), Share(0.1));
         assert!(serde_json::from_str::<Share>("1.01").is_err() && "1.01".parse::<Share>().is_err());
+        assert_eq!("1".parse::<PositiveShare>(), Ok(PositiveShare(1.0)));
+        for wrong in ["0", "-0.1", "1.01", "nan"] {
+            assert_eq!(wrong.parse::<PositiveShare>(), Err(format!("`{wrong}` is not a number above 0 and up to 1")));
+        }
     }
 }

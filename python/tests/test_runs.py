@@ -125,7 +125,7 @@ def test_trajectory_files_are_read_as_by_the_command_line(tmp_path: Path) -> Non
     for call, message in [
         (lambda: cc.lane_changes(file, criterion="jump"), "criterion=: `jump`, expected one of `peak`, `distance`, `gradient`"),  # type: ignore[arg-type]
         (lambda: cc.lane_changes(file, criterion="gradient"), "use `peak` or `distance` as criterion="),
-        (lambda: cc.criticality(file, speed_limit_mps=-3), "speed_limit_mps=: `-3` is not a number above 0"),
+        (lambda: cc.criticality(file, speed_limit_mps=-3), "speed_limit_mps=: `-3` is not a finite number above 0"),
         (lambda: cc.fit(file, seed=-1), "seed: expected a whole number"),
         (lambda: cc.fit([]), "files: expected at least one trajectory file"),
     ]:

@@ -26,6 +26,8 @@ use super::CliError;
 const ALL_OPTIONS: &str = "the same command with --help lists its options";
 const OTHER_FOLDER: &str = "name a folder with --out DIR, or keep no results with --no-out";
 const RESUME: &str = "the same command with --resume goes on with the campaign";
+const COMPLETE: &str =
+    "the command of the campaign with --resume completes it: `closecall check DIR` prints that command";
 
 impl Diagnostic for CliError {
     fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
@@ -40,7 +42,15 @@ fn advice(error: &CliError) -> Option<&'static str> {
         CliError::Folder(error) => of_folder(error),
         CliError::Campaign(error) | CliError::Merge(MergeError::Campaign(error)) => of_campaign(error),
         CliError::Merge(MergeError::NotAPart { .. }) => Some("`closecall campaign … --partition K/N` runs a part"),
-        CliError::Merge(MergeError::Incomplete { .. } | MergeError::Rare(RareError::MissingRun { .. })) => Some(RESUME),
+        CliError::Merge(MergeError::OtherCampaign { differences, .. }) => {
+            let has_grown = differences.len() == 1 && differences[0].starts_with("sampling.samples:");
+            has_grown.then_some(
+                "run every part to the same number of samples: the command of the shorter one with -n and --resume",
+            )
+        }
+        CliError::Merge(MergeError::Incomplete { .. } | MergeError::Rare(RareError::MissingRun { .. })) => {
+            Some(COMPLETE)
+        }
         CliError::Saved(error) | CliError::Causes(CausesError::Saved(error)) => of_saved(error),
         CliError::Report(ReportError::Folder(error)) => of_folder(error),
         CliError::Report(ReportError::Saved(error)) => of_saved(error),
@@ -85,8 +95,11 @@ fn of_campaign(error: &CampaignError) -> Option<&'static str> {
 }
 
 fn of_folder(error: &FolderError) -> Option<&'static str> {
-    let is_resumable = matches!(error, FolderError::AlreadyThere { .. } | FolderError::Incomplete { .. });
-    is_resumable.then_some(RESUME)
+    match error {
+        FolderError::AlreadyThere { .. } => Some(RESUME),
+        FolderError::Incomplete { .. } => Some(COMPLETE),
+        _ => None,
+    }
 }
 
 fn of_saved(error: &SavedError) -> Option<&'static str> {

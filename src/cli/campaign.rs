@@ -253,11 +253,13 @@ impl CampaignArgs {
 
     fn workers(&self) -> Result<Workers, CliError> {
         let timeout_s = self.sample_timeout_s.map_or(SAMPLE_TIMEOUT_S, |time| time.0);
-        let usage =
-            |why| CliError::usage(format!("{} {timeout_s:?}: the time is too {why}", Argument("sample-timeout-s")));
-        let sample_timeout = Duration::try_from_secs_f64(timeout_s).map_err(|_| usage("long"))?;
+        let usage = || {
+            let (option, least_s, most_s) = (Argument("sample-timeout-s"), 1e-9, Duration::MAX.as_secs_f64());
+            CliError::usage(format!("{option} {timeout_s:?} is not a number from {least_s:?} to {most_s:e}"))
+        };
+        let sample_timeout = Duration::try_from_secs_f64(timeout_s).map_err(|_| usage())?;
         if sample_timeout.is_zero() {
-            return Err(usage("short"));
+            return Err(usage());
         }
         Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs.map(|jobs| jobs.0)) })
     }

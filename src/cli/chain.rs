@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_campaign::arguments::count;
+use closecall_campaign::arguments::{count, whole};
 use closecall_campaign::earlier_failures::EarlierFailures;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::plan::Plan;
@@ -81,7 +81,7 @@ pub(super) struct ChainArgs {
     resume: bool,
     /// Largest number of encounters: the most relevant ones, critical before others, and each as
     /// different as possible from the rest
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1_000), help_heading = heading::METHOD)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = whole::<u16, 1, 1_000>, help_heading = heading::METHOD)]
     encounters: u16,
     /// Number of samples of each encounter
     #[arg(short = 'n', long = "samples", default_value_t = 100, value_parser = count, help_heading = heading::SAMPLES)]
@@ -95,7 +95,7 @@ pub(super) struct ChainArgs {
     #[arg(long, value_enum, default_value = "full", help_heading = heading::CONTROLLER)]
     sensors: SensorsChoice,
     /// Number of worker threads [default: one per processor]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
+    #[arg(long, value_parser = whole::<u16, 1, 1024>, help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
     /// Save recordings (Rerun files) of selected samples of each encounter, as `campaign` does
     /// [default: worst:1,each-kind]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::whole;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_report::exchange::{Case, Form, Motion, write_case};
 use closecall_scenarios::sampling::Design;
@@ -66,7 +67,7 @@ pub(super) struct ExportArgs {
     #[arg(long = "form", value_enum, value_delimiter = ',', value_name = "FORM,…", help_heading = heading::OUTPUT)]
     forms: Vec<FormChoice>,
     /// Number of samples in the value set of the logical form, from SAMPLE on
-    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000), help_heading = heading::OUTPUT)]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = whole::<u64, 1, 100_000>, help_heading = heading::OUTPUT)]
     value_sets: u64,
     /// Seed of the random numbers [default: 0, or the seed of the campaign]
     #[arg(long, value_parser = closecall_campaign::arguments::seed, help_heading = heading::SAMPLES)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_campaign::arguments::positive;
+use closecall_campaign::arguments::{positive, whole};
 use closecall_campaign::robustness::robustness;
 use closecall_recorded::criticality::{Judgement, criticality};
 use closecall_recorded::robustness::Setup;
@@ -36,7 +36,7 @@ pub(super) struct PaperArgs {
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     /// Number of draws of the noise at each level; 0 leaves figure 3 out
-    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(0..=10_000), help_heading = heading::METHOD)]
+    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = whole::<u64, 0, 10_000>, help_heading = heading::METHOD)]
     repetitions: u64,
     /// Folder for the pictures and `index.html`
     #[arg(short, long = "out", alias = "output", value_name = "DIR", help_heading = heading::OUTPUT)]

@@ -97,7 +97,7 @@ pub(super) struct PerceiveArgs {
 /// Parses a factor of intensities.
 fn scale(text: &str) -> Result<f32, String> {
     let factor = text.parse::<f32>().ok().filter(|factor| *factor > 0.0 && factor.is_finite());
-    factor.ok_or_else(|| "a number above 0 is needed".to_owned())
+    factor.ok_or_else(|| format!("a number above 0 and up to {:e} is needed", f32::MAX))
 }
 
 impl PerceiveArgs {

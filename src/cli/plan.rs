@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use closecall_campaign::arguments::{Count, Share, WallTime, parsed_option};
+use closecall_campaign::arguments::{Count, PositiveShare, WallTime, parsed_option};
 use closecall_campaign::gate::PresetGates;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::validity::CheckPlan;
@@ -82,7 +82,7 @@ pub(super) struct PlanArgs {
     /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1.
     /// The first two samples of each scenario are always checked [default: 0.01]
     #[arg(long, value_name = "SHARE", help_heading = heading::VALIDITY)]
-    check_share: Option<Share>,
+    check_share: Option<PositiveShare>,
     /// Largest number of samples of each scenario that are checked, besides the first two
     /// [default: 1000]
     #[arg(long, value_name = "N", help_heading = heading::VALIDITY)]

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_campaign::arguments::count;
+use closecall_campaign::arguments::{count, whole};
 use closecall_campaign::boundary::{Axis, BoundaryPlan, LARGEST_BUDGET, SMALLEST_BUDGET};
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};
@@ -47,7 +47,7 @@ pub(super) struct StudyArgs {
     #[arg(long, value_enum, help_heading = heading::CONTROLLER)]
     sensors: Option<SensorsChoice>,
     /// Number of worker threads [default: one per processor]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
+    #[arg(long, value_parser = whole::<u16, 1, 1024>, help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
     /// Folder for the page, the charts (SVG) and the figures (JSON)
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]
@@ -79,13 +79,13 @@ pub(super) struct SensitivityArgs {
     #[arg(long, value_name = "morris|sobol|both", default_value = "both", help_heading = heading::METHOD)]
     method: Method,
     /// Number of trajectories of the screening, each with a run for every factor
-    #[arg(long, value_name = "N", default_value = "40", value_parser = clap::value_parser!(u64).range(1..=10_000), help_heading = heading::METHOD)]
+    #[arg(long, value_name = "N", default_value = "40", value_parser = whole::<u64, 1, 10_000>, help_heading = heading::METHOD)]
     trajectories: u64,
     /// Number of rows of the decomposition, each with a run for every factor
-    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = clap::value_parser!(u64).range(1..=1 << 21), help_heading = heading::METHOD)]
+    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = whole::<u64, 1, { 1 << 21 }>, help_heading = heading::METHOD)]
     rows: u64,
     /// Number of factors that the decomposition keeps apart after the screening
-    #[arg(long, value_name = "N", default_value = "8", value_parser = clap::value_parser!(u64).range(1..=128), help_heading = heading::METHOD)]
+    #[arg(long, value_name = "N", default_value = "8", value_parser = whole::<u64, 1, 128>, help_heading = heading::METHOD)]
     top: u64,
 }
 
@@ -127,7 +127,7 @@ pub(super) struct BoundaryArgs {
     #[arg(short, long, value_name = "EVENT", help_heading = heading::METHOD)]
     event: EventExpression,
     /// Number of runs: 20 fill the rectangle of both parameters, the others are added near the boundary
-    #[arg(short = 'n', long = "runs", value_name = "N", default_value = "60", value_parser = clap::value_parser!(u64).range(SMALLEST_BUDGET..=LARGEST_BUDGET), help_heading = heading::METHOD)]
+    #[arg(short = 'n', long = "runs", value_name = "N", default_value = "60", value_parser = whole::<u64, SMALLEST_BUDGET, LARGEST_BUDGET>, help_heading = heading::METHOD)]
     runs: u64,
     /// Sample whose random numbers all runs share
     #[arg(long, value_name = "N", default_value = "0", help_heading = heading::SAMPLES)]
@@ -153,7 +153,7 @@ pub(super) struct AnchorArgs {
     #[arg(long, value_name = "DIR|FILE|NAME", num_args = 1.., help_heading = heading::SCENARIO)]
     ensemble: Vec<PathBuf>,
     /// Number of worker threads [default: one per processor]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = heading::EXECUTION)]
+    #[arg(long, value_parser = whole::<u16, 1, 1024>, help_heading = heading::EXECUTION)]
     jobs: Option<u16>,
     /// Folder for the page, the chart (SVG) and the figures (JSON)
     #[arg(short, long, value_name = "DIR", help_heading = heading::OUTPUT)]

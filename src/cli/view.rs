@@ -14,6 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_campaign::arguments::whole;
 use closecall_campaign::folder::{EXPLORER, MANIFEST, RECORDINGS, REPORT};
 use closecall_report::run::rerun::{RerunVersion, VersionError};
 use closecall_traffic::input::named;
@@ -53,7 +54,7 @@ pub(super) struct ViewArgs {
     web: bool,
     /// Port of the viewer, which is 9876 unless stated; with --web the port of its page, which is
     /// 9090 unless stated
-    #[arg(long, help_heading = heading::VIEWER)]
+    #[arg(long, value_parser = whole::<u16, 0, 65_535>, help_heading = heading::VIEWER)]
     port: Option<u16>,
     /// Open nothing, only print the paths of the report and the recordings, one per line
     #[arg(long, help_heading = heading::VIEWER)]

@@ -212,11 +212,11 @@ fn a_misspelt_or_negative_value_is_explained() {
         ),
         (
             ["traffic", "robustness", "traffic.csv", "--repetitions=0"],
-            "'0' for '--repetitions <REPETITIONS>': expected a whole number from 1 to 10000",
+            "'0' for '--repetitions <REPETITIONS>': `0` is not a whole number from 1 to 10000",
         ),
         (
             ["study", "sensitivity", "paper-figure", "--rows=9999999"],
-            "'9999999' for '--rows <N>': expected a whole number from 1 to 2097152",
+            "'9999999' for '--rows <N>': `9999999` is not a whole number from 1 to 2097152",
         ),
         (
             ["run", "paper-figur", "--seed", "1"],
@@ -231,6 +231,12 @@ fn a_misspelt_or_negative_value_is_explained() {
 }
 
 #[test]
+        (["study", "boundary", "paper-figure", "--runs=x"], "`x` is not a whole number from 30 to 200"),
+        (["view", "results", "--port", "65536"], "`65536` is not a whole number from 0 to 65535"),
+        (["study", "perceive", "scans.pcd", "--intensity-scale=1e300"], "a number above 0 and up to 3.4028235e38"),
+        (["campaign", "paper-figure", "--check-share", "2"], "`2` is not a number above 0 and up to 1"),
+        (["campaign", "paper-figure", "--check-share", "0"], "`0` is not a number above 0 and up to 1"),
+        (["campaign", "paper-figure", "--max-jerk", "1e400"], "`1e400` is not a finite number above 0"),
 fn a_wrong_path_is_named_with_what_it_is() {
     let folder = folder();
     let path = folder.path().to_str().unwrap();
@@ -252,7 +258,7 @@ fn a_wrong_path_is_named_with_what_it_is() {
     assert_eq!(code(&odd), 2);
     assert!(message(&odd).contains("there is no scenario `nope\u{fffd}`"), "{}", message(&odd));
     let none = stderr(&closecall(["tool", "render", "-n", "0", "--out", path]));
-    assert!(none.contains("`0` is none: a whole number of 1 or more is needed"), "{none}");
+    assert!(none.contains("`0` is too small: a whole number of 1 or more is needed"), "{none}");
 }
 
 #[test]

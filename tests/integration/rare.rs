@@ -152,7 +152,7 @@ fn what_does_not_fit_weighted_runs_is_refused_with_its_name() {
         ("--design subset --event collision --time-budget 9s", "--time-budget"),
         ("--design subset --event collision --no-validity-checks", "--no-validity-checks"),
         ("--design subset --event engaged", "with --guide MEASURE"),
-        ("--design subset --event collision --relative-width 0", "not a number above 0"),
+        ("--design subset --event collision --relative-width 0", "not a finite number above 0"),
         ("--design subset --event crash", "not a measure; there are"),
         ("--design subset --event induced", "it needs --paired or --arms"),
         ("--design subset --event collision --guide engaged", "is not a number of a sample"),
