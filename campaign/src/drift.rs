@@ -1,8 +1,9 @@
 //! Drift: whether new traffic still matches the distributions that a scenario was fitted to.
 //!
 //! Each quantity of the fitted file is compared with its values in new trajectory data by a
-//! two-sample Kolmogorov–Smirnov test ([`two_sample`]). The p-values are corrected for the number
-//! of tests ([`holm`]), so that the probability of any false alarm is at most [`LEVEL`].
+//! two-sample Kolmogorov–Smirnov test at the fitted quantiles ([`two_sample`]). New values are rounded
+//! as the quantiles are ([`DECIMALS`]). The p-values are corrected for the number of tests ([`holm`]),
+//! so that the probability of any false alarm is at most [`LEVEL`].
 //!
 //! A parameter is compared with its *quantity* in the range of its *cut*, on both sides: a
 //! scenario's headways from 0.5 to 0.9 s with the new headways from 0.5 to 0.9 s. Quantities that
@@ -14,7 +15,7 @@
 use std::path::Path;
 
 use closecall_recorded::filters::SmoothedFile;
-use closecall_recorded::fit::{MIN_VALUES, Quantity, Samples, observe};
+use closecall_recorded::fit::{DECIMALS, MIN_VALUES, Quantity, Samples, observe};
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
 use closecall_scenarios::{ScenarioError, source};
 use closecall_traffic::Stream;
@@ -155,7 +156,7 @@ pub struct QuantityDrift {
     pub p_value: Option<f64>,
     /// The probability, corrected for the number of tests (-).
     pub corrected_p_value: Option<f64>,
-    /// Distance from which on the test finds drift with these numbers of values (-).
+    /// Distance beyond which the test finds drift with these numbers of values (-).
     pub found_from: Option<f64>,
     /// Number of new values with which the test finds the observed distance; `None` if no number
     /// suffices.
@@ -182,44 +183,54 @@ pub fn drift(fitted: &Fitted, files: &[SmoothedFile], seed: u64) -> Drift {
     for file in files {
         samples.extend(observe(&file.data));
     }
-    let p_value = |name: &str, summary: &Summary, new: &[f64]| {
-        two_sample::p_value(summary.distance(new), &summary.simulated(new.len(), &mut stream(seed, name)))
-    };
-    drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &p_value)
+    let simulated = |name: &str, summary: &Summary, m: usize| summary.simulated(m, &mut stream(seed, name));
+    drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &simulated)
 }
 
-/// A function that returns the probability of a distance larger than the distance of these sorted
-/// new values.
-type PValue<'a> = dyn Fn(&str, &Summary, &[f64]) -> f64 + 'a;
+/// A function that returns simulated distances of a number of new values, in ascending order.
+type Simulated<'a> = dyn Fn(&str, &Summary, usize) -> Vec<f64> + 'a;
 
 /// The result of one test.
 #[derive(Clone, Copy)]
 struct TestResult {
     distance: f64,
     p_value: f64,
+    /// Distance beyond which the test finds drift.
+    critical: f64,
 }
 
-fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PValue<'_>) -> Drift {
+fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, simulated: &Simulated<'_>) -> Drift {
+    let steps = 10_f64.powi(i32::from(DECIMALS));
     let sorted = |parameter: &FittedParameter| {
         let mut values = values(parameter.quantity);
         values.retain(|value| parameter.cut.is_none_or(|[from, to]| (from..to).contains(value)));
+        values.iter_mut().for_each(|value| *value = (*value * steps).round() / steps);
         values.sort_by(f64::total_cmp);
         values
     };
     let new: Vec<Vec<f64>> = fitted.0.iter().map(sorted).collect();
+    let is_enough = |new: &Vec<f64>| new.len() >= MIN_VALUES;
+    let level = LEVEL / new.iter().filter(|new| is_enough(new)).count().max(1) as f64;
     let tests = fitted.0.iter().zip(&new).map(|(FittedParameter { name, summary, .. }, new)| {
-        let test = || TestResult { distance: summary.distance(new), p_value: p_value(name, summary, new) };
-        (new.len() >= MIN_VALUES).then(test)
+        let test = || {
+            let (distance, simulated) = (summary.distance(new), simulated(name, summary, new.len()));
+            let p_value = two_sample::p_value(distance, &simulated);
+            TestResult { distance, p_value, critical: two_sample::critical_distance(&simulated, level) }
+        };
+        is_enough(new).then(test)
     });
     let tests: Vec<Option<TestResult>> = tests.collect();
     let p_values: Vec<f64> = tests.iter().flatten().map(|test| test.p_value).collect();
-    let level = LEVEL / p_values.len().max(1) as f64;
     let mut corrected = holm::corrected(&p_values).into_iter();
     let mut quantities = Vec::new();
     for ((parameter, new), test) in fitted.0.iter().zip(&new).zip(&tests) {
         let summary = &parameter.summary;
         let shift = summary.distance_of_shift(|value| value * (1.0 + STATED_SHIFT));
-        let needed = |distance| two_sample::needed(level, summary.n(), distance);
+        let factor = test.map_or_else(
+            || two_sample::asymptotic_factor(level),
+            |test| two_sample::factor(test.critical, summary.n(), new.len()),
+        );
+        let needed = |distance| two_sample::needed(factor, summary.n(), distance);
         quantities.push(QuantityDrift {
             name: parameter.name.clone(),
             quantity: parameter.quantity.name(),
@@ -232,7 +243,7 @@ fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PV
             distance: test.map(|test| test.distance),
             p_value: test.map(|test| test.p_value),
             corrected_p_value: test.and_then(|_| corrected.next()),
-            found_from: test.map(|_| two_sample::critical_distance(level, summary.n(), new.len())),
+            found_from: test.map(|test| test.critical),
             needed: test.and_then(|test| needed(test.distance)),
             needed_for_five_percent: needed(shift),
         });
@@ -292,9 +303,8 @@ mod tests {
             let any = summary(&drawn(fitted_n, truth, &mut Stream::seed_from_u64(0)));
             (quantity.name(), any.simulated(n, &mut stream(0, quantity.name())))
         });
-        let p_value = |name: &str, summary: &Summary, new: &[f64]| {
-            let (_, distances) = simulated.iter().find(|(quantity, _)| *quantity == name).unwrap();
-            two_sample::p_value(summary.distance(new), distances)
+        let simulated = |name: &str, _: &Summary, _: usize| {
+            simulated.iter().find(|(quantity, _)| *quantity == name).unwrap().1.clone()
         };
         let is_called = |index: &u64| {
             let mut rng = Stream::seed_from_u64(*index);
@@ -308,7 +318,7 @@ mod tests {
                 (quantity, values.into_iter().map(|value| shift(quantity, value)).collect::<Vec<f64>>())
             });
             let values = |wanted| new.iter().find(|(quantity, _)| *quantity == wanted).unwrap().1.clone();
-            drift_of(&fitted, values, &p_value).has_drifted
+            drift_of(&fitted, values, &simulated).has_drifted
         };
         (0..1_000_u64).into_par_iter().filter(is_called).count() as f64 / 1_000.0
     }
@@ -343,6 +353,31 @@ mod tests {
     const DOCUMENTED: [[f64; 3]; 3] = [[0.046, 0.184, 0.104], [0.048, 0.452, 0.216], [0.043, 0.711, 0.394]];
 
     #[test]
+    fn any_number_of_values_that_vehicles_share_matches_its_own_fit() {
+        // Seven speeds, with differences far below the written decimals.
+        let speeds =
+            |n: u32| -> Vec<f64> { (0..n).map(|k| 22.1 + 0.3 * f64::from(k % 7) + 1e-7 * f64::from(k % 11)).collect() };
+        for n in [14, 500, 20_000] {
+            let mut sorted = speeds(n);
+            sorted.sort_by(f64::total_cmp);
+            let quantiles: Vec<String> = (0..=10)
+                .map(|k| format!("{:.1$}", quantile(&sorted, f64::from(k) / 10.0), usize::from(DECIMALS)))
+                .collect();
+            let text = format!(
+                "[parameters]\nfollowing-mps = {{ empirical = {{ quantiles = [{}] }}, fitted = {{ n = {n}, source = 's' }} }}",
+                quantiles.join(", ")
+            );
+            let fitted = Fitted::parse(&text).unwrap();
+            let simulated = |name: &str, summary: &Summary, m: usize| summary.simulated(m, &mut stream(0, name));
+            let drift = drift_of(&fitted, |_| speeds(n), &simulated);
+            assert!(drift.is_tested && !drift.has_drifted, "{n}: {drift:?}");
+            // What must not pass: a speed of the seven is missing.
+            let others = |_: Quantity| -> Vec<f64> { speeds(n).into_iter().filter(|speed| *speed < 23.8).collect() };
+            assert_eq!(drift_of(&fitted, others, &simulated).has_drifted, n > 14, "{n}");
+        }
+    }
+
+    #[test]
     fn a_file_without_fitted_quantities_is_refused() {
         assert!(Fitted::parse("a = 1").unwrap_err().contains("parameters"));
         assert!(Fitted::parse("[parameters]\nx = { fixed = 1.0 }").unwrap_err().contains("cut-out-thw-s"));
@@ -364,7 +399,7 @@ mod tests {
         assert_eq!((fitted.0[1].quantity, fitted.0[1].cut), (Quantity::FrontThw, Some([0.5, 0.9])));
         let headways = || (0..300).map(|k| 0.01 * f64::from(k)).collect::<Vec<f64>>();
         let values = |quantity| if quantity == Quantity::FrontThw { headways() } else { Vec::new() };
-        let drift = drift_of(&fitted, values, &|_, summary, new| summary.distance(new));
+        let drift = drift_of(&fitted, values, &|_, _, _| vec![0.0]);
         assert_eq!(drift.quantities[1].n, 40, "of 300 headways, those from 0.5 up to below 0.9 s");
     }
 }

@@ -48,4 +48,4 @@ pub use correlation::RankCorrelation;
 pub use distribution::{FittedQuantity, Form, GoodnessOfFit, MIN_VALUES};
 pub use fitted::{FittedDistributions, correlated, correlated_in_files, fit};
 pub use observe::{Quantity, Samples, observe};
-pub use toml_text::{Heading, to_toml, write_toml};
+pub use toml_text::{DECIMALS, Heading, to_toml, write_toml};

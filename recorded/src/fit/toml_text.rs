@@ -113,9 +113,11 @@ fn form_text(form: Form) -> String {
     }
 }
 
-/// Formats a number to three decimals, which is finer than the resolution of any trajectory data.
+/// Number of decimals of the written values: finer than the resolution of any trajectory data.
+pub const DECIMALS: u8 = 3;
+
 fn number(value: f64) -> String {
-    format!("{value:.3}")
+    format!("{value:.0$}", usize::from(DECIMALS))
 }
 
 /// Replaces control characters, so that the text stays on one line.
