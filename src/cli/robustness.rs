@@ -4,7 +4,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_campaign::robustness::{RobustnessError, robustness as study};
+use closecall_campaign::arguments::whole;
+use closecall_campaign::robustness::{RobustnessError, StudiedFiles, robustness as study};
 use closecall_recorded::robustness::{FEWEST_LANE_CHANGES, Setup};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, robustness_charts};
@@ -31,7 +32,7 @@ pub(super) struct RobustnessArgs {
     #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed, help_heading = heading::METHOD)]
     seed: u64,
     /// Number of draws of the noise at each level
-    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(1..=10_000), help_heading = heading::METHOD)]
+    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = whole::<u64, 1, 10_000>, help_heading = heading::METHOD)]
     repetitions: u64,
     /// Folder for the charts `noise.svg` and `offset.svg`
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
@@ -54,7 +55,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         })
     });
     let studied = studied.map_err(refused)?;
-    let Some((_, study)) = studied else { return Ok(ExitCode::Pass) };
+    let Some(StudiedFiles { all: study, is_in_doubt, .. }) = studied else { return Ok(ExitCode::Pass) };
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &robustness_charts(&study)?)?;
     }
@@ -74,7 +75,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         ));
         return Ok(ExitCode::Inconclusive);
     }
-    Ok(ExitCode::Pass)
+    Ok(if is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass })
 }
 
 /// Returns the error of a study that is not possible.

@@ -14,9 +14,10 @@
 //!
 //! **Reference.** For an in-car log, the reference consists of the undisturbed lane changes by the
 //! gradient criterion. For other trajectory data, it consists of the undisturbed lane changes by
-//! the peak criterion with recorded lanes. It tells how many of the lane changes that each
-//! criterion detects undisturbed are true. The reference of each criterion is its own detection on
-//! undisturbed data: its misses and inventions there say nothing about disturbances.
+//! the peak criterion with recorded lanes; without them, with estimated lanes or by the lateral shift.
+//! It tells how many of the lane changes that each criterion detects undisturbed are true. The
+//! reference of each criterion is its own detection on undisturbed data: its misses and inventions
+//! there say nothing about disturbances.
 //!
 //! **Matching.** A lane change counts as detected again if a detected lane change in the same
 //! direction on the same track overlaps it in time. Each lane change belongs to at most one pair,

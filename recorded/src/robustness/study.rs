@@ -56,6 +56,8 @@ pub enum ReferenceKind {
     /// Lane changes by the peak criterion: changes of the recorded lane at peaks of the lateral
     /// speed.
     RecordedLanes,
+    /// Lane changes by the peak criterion: changes of the lane that the traffic shows.
+    EstimatedLanes,
     /// Lane changes by the peak criterion: lateral shifts by most of a lane.
     LateralShift,
 }
@@ -94,24 +96,27 @@ pub struct CriterionCounts {
 }
 
 impl Study {
-    /// Detects the reference lane changes in `tracks` on the road with these `markings`.
+    /// Detects the reference lane changes in `tracks` on the road with these `markings`. They are tracks of
+    /// in-car logs, if distances to the markings were measured, or else have recorded lanes.
     pub fn new(tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
-        Self::with_lanes(LaneReliability::Reliable, tracks, markings)
+        let is_log = tracks.iter().any(|(_, distances)| !distances.is_empty());
+        Self::of_file((!is_log).then_some(LaneReliability::Reliable), tracks, markings)
     }
 
-    /// Works like [`Self::new`]. The peak criterion finds the reference by the recorded lanes only
-    /// if they are reliable.
-    pub fn with_lanes(lanes: LaneReliability, tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
-        let has_distances = tracks.iter().any(|(_, distances)| !distances.is_empty());
-        let (kind, reference_criterion, criteria) = if has_distances {
-            (ReferenceKind::Gradient, Criterion::Gradient, Criterion::ALL.to_vec())
-        } else {
-            let kind = match lanes {
-                LaneReliability::Reliable | LaneReliability::Estimated => ReferenceKind::RecordedLanes,
-                LaneReliability::Unreliable => ReferenceKind::LateralShift,
-            };
-            (kind, Criterion::Peak, vec![Criterion::Peak, Criterion::Distance])
+    /// Works like [`Self::new`] for some tracks of a file whose lanes are as reliable as `lanes` says, or
+    /// of an in-car log if it is `None`.
+    pub fn of_file(lanes: Option<LaneReliability>, tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
+        let kind = match lanes {
+            None => ReferenceKind::Gradient,
+            Some(LaneReliability::Reliable) => ReferenceKind::RecordedLanes,
+            Some(LaneReliability::Estimated) => ReferenceKind::EstimatedLanes,
+            Some(LaneReliability::Unreliable) => ReferenceKind::LateralShift,
         };
+        let (reference_criterion, criteria) = match kind {
+            ReferenceKind::Gradient => (Criterion::Gradient, Criterion::ALL.to_vec()),
+            _ => (Criterion::Peak, vec![Criterion::Peak, Criterion::Distance]),
+        };
+        let lanes = lanes.unwrap_or_default();
         let reference_detector = LaneChangeDetector::new(lanes, markings);
         let reference: Vec<_> = tracks
             .iter()

@@ -7,6 +7,7 @@
 //! | 6 | histograms of the seven metrics with their thresholds | `figure-6-….svg` |
 //! | 7 | critical shares to the left and to the right, with exact intervals | `figure-7-shares.svg` |
 
+use closecall_campaign::robustness::StudiedFiles;
 use closecall_recorded::criticality::{CriticalLaneChange, Statistics, statistics};
 use closecall_recorded::robustness::Robustness;
 use maud::{PreEscaped, html};
@@ -48,7 +49,7 @@ impl Paper {
     /// [`ChartError`] if a figure cannot be drawn.
     pub fn new(
         recordings: &[RecordedChanges],
-        robustness: Option<&(Vec<Robustness>, Robustness)>,
+        robustness: Option<&StudiedFiles>,
         speed_limit_mps: Option<f64>,
     ) -> Result<Self, ChartError> {
         let all: Vec<CriticalLaneChange> =
@@ -57,7 +58,7 @@ impl Paper {
         let mut push = |figure: u32, name: &str, svg: String| {
             pictures.push(Picture { figure, name: format!("figure-{figure}-{name}.svg"), svg });
         };
-        if let Some((_, together)) = robustness {
+        if let Some(StudiedFiles { all: together, .. }) = robustness {
             let [noise, offset] = robustness_charts(together)?;
             push(3, "noise", noise);
             push(3, "offset", offset);
@@ -96,7 +97,7 @@ fn failures(recordings: &[RecordedChanges], each: &[Robustness]) -> Vec<Vec<Stri
 fn page(
     recordings: &[RecordedChanges],
     statistics: &Statistics,
-    robustness: Option<&(Vec<Robustness>, Robustness)>,
+    robustness: Option<&StudiedFiles>,
     pictures: &[Picture],
 ) -> String {
     let names: Vec<&str> = recordings.iter().map(|recording| recording.name.as_str()).collect();
@@ -108,7 +109,7 @@ fn page(
     };
     let body = html! {
         (head(TITLE, &[], &format!("Trajectory files: {}", names.join(", "))))
-        @if let Some((each, together)) = robustness {
+        @if let Some(StudiedFiles { each, all: together, .. }) = robustness {
             h2 { "Figure 3: what the criteria tolerate" }
             (drawn(3))
             h3 { "Lowest level of noise at which a criterion fails" }

@@ -21,6 +21,7 @@ impl fmt::Display for RobustnessText<'_> {
         let reference = match study.reference_kind {
             ReferenceKind::Gradient => "jumps of the distances to the markings",
             ReferenceKind::RecordedLanes => "recorded lanes",
+            ReferenceKind::EstimatedLanes => "lanes that are estimated from the traffic",
             ReferenceKind::LateralShift => "lateral shift",
         };
         let Setup { repetitions, seed, .. } = study.setup;
