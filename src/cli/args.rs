@@ -141,7 +141,7 @@ pub(super) fn read_noting(path: &Path, options: ReadOptions) -> Result<Trajector
     for warning in data.warnings() {
         warn(format_args!("{}: {warning}", path.display()));
     }
-    advise_on_lanes(data.doubts_lanes);
+    advise(data.doubts_lanes, data.doubts_sides);
     Ok(data)
 }
 
@@ -157,7 +157,7 @@ pub(super) fn smooth_noting(data: &FilesArgs) -> Result<Vec<SmoothedFile>, CliEr
         for warning in &file.warnings {
             warn(format_args!("{}: {warning}", path.display()));
         }
-        advise_on_lanes(file.doubts_lanes);
+        advise(file.doubts_lanes, file.doubts_sides);
         read.note(path, &file.hash)?;
         Ok::<SmoothedFile, CliError>(file)
     });
@@ -173,10 +173,13 @@ pub(super) fn warn_without_lane_changes(files: &[PathBuf], lane_changes: usize) 
     lane_changes == 0
 }
 
-/// Names the option that takes no lane as recorded, if the recorded lanes are in doubt.
-pub(super) fn advise_on_lanes(are_in_doubt: bool) {
-    if are_in_doubt {
+/// Names the options that help if the recorded lanes are in doubt, or if left and right may be exchanged.
+pub(super) fn advise(doubts_lanes: bool, doubts_sides: bool) {
+    if doubts_lanes {
         print_error(format_args!("help: `--lanes none` takes no lane as recorded\n"));
+    }
+    if doubts_sides {
+        print_error(format_args!("help: `--mirror-d --lanes-from-right` turns a mirrored file\n"));
     }
 }
 
@@ -193,7 +196,7 @@ pub(super) struct ReadArgs {
     /// Data set to read of a file that holds several: the location of NGSIM's export
     #[arg(long, value_enum, value_name = "NAME", help_heading = heading::DATA)]
     location: Option<Location>,
-    /// The lateral position of the file points to the other side than its layout states
+    /// The lateral axis of the file is mirrored against its layout
     #[arg(long, help_heading = heading::DATA)]
     mirror_d: bool,
     /// The file counts its lanes from the right

@@ -9,7 +9,7 @@ use closecall_report::traffic::quality::QualityText;
 use closecall_traffic::words::counted;
 
 use super::CliError;
-use super::args::{Format, ReadArgs, advise_on_lanes};
+use super::args::{Format, ReadArgs, advise};
 use super::help::{examples, heading};
 use super::output::{outln, print_error, print_text, reading};
 use crate::exit_code::ExitCode;
@@ -48,7 +48,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(json::quality(&tracks, &inspector), None, None)),
         Format::Human => print_text(QualityText { tracks: &tracks, inspector: &inspector }),
     }
-    advise_on_lanes(tracks.doubts_lanes());
+    advise(tracks.doubts_lanes(), tracks.doubts_sides());
     let dropped = tracks.dropped();
     if dropped.count() == 0 || args.read.drop_bad_rows {
         return Ok(if tracks.doubts_lanes() { ExitCode::Inconclusive } else { ExitCode::Pass });

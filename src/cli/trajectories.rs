@@ -22,9 +22,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::CliError;
-use super::args::{
-    FilesArgs, Format, LanesChoice, ReadArgs, advise_on_lanes, smooth_noting, warn_without_lane_changes,
-};
+use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise, smooth_noting, warn_without_lane_changes};
 use super::argument::Argument;
 use super::help::{examples, heading};
 use super::output::{command_line, during, out, outln, print_text, print_written, reading, warn, write_charts};
@@ -232,7 +230,7 @@ pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliErr
     for warning in tracks.warnings().into_iter().chain(basis.warnings()) {
         warn(format_args!("{}: {warning}", args.file.display()));
     }
-    advise_on_lanes(basis.lacks_recorded_crossings() || tracks.doubts_lanes());
+    advise(basis.lacks_recorded_crossings() || tracks.doubts_lanes(), tracks.doubts_sides());
     let has_none = match basis.unexplained_crossings(changes.len()) {
         Some(reason) => {
             warn(format_args!("{}: {reason}", args.file.display()));
@@ -305,7 +303,7 @@ fn judge_file(args: &CriticalityArgs) -> Result<JudgedFile, CliError> {
     for warning in &file.warnings {
         warn(format_args!("{}: {warning}", args.file.display()));
     }
-    advise_on_lanes(file.doubts_lanes);
+    advise(file.doubts_lanes, file.doubts_sides);
     let smoothed = &file.data;
     let speed_limit_mps = args.speed_limit_mps.map(|limit| limit.0);
     let judgement = Judgement { speed_limit_mps, ttce_alone: args.ttce_alone, curvilinear: args.curvilinear };

@@ -27,6 +27,8 @@ pub struct SmoothedFile {
     pub is_in_doubt: bool,
     /// Whether a warning says that the recorded lanes are none.
     pub doubts_lanes: bool,
+    /// Whether a warning says that left and right may be exchanged.
+    pub doubts_sides: bool,
     /// What a reader of results has to know of the file.
     pub warnings: Vec<String>,
     /// BLAKE3 hash of the file content in hexadecimal digits.
@@ -48,9 +50,9 @@ pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, Tr
     }
     let data = read_with(path, options)?;
     let (flaws, warnings) = (count_flaws(&data), data.warnings());
-    let (is_in_doubt, doubts_lanes) = (data.is_in_doubt, data.doubts_lanes);
+    let (is_in_doubt, doubts_lanes, doubts_sides) = (data.is_in_doubt, data.doubts_lanes, data.doubts_sides);
     let (period, hash) = (data.period, data.hash.clone());
-    Ok(SmoothedFile { data: smooth(&data), flaws, period, is_in_doubt, doubts_lanes, warnings, hash })
+    Ok(SmoothedFile { data: smooth(&data), flaws, period, is_in_doubt, doubts_lanes, doubts_sides, warnings, hash })
 }
 
 /// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
@@ -75,6 +77,6 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
     let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
     let (flaws, period, is_in_doubt) = (inspector.count_flaws(), file.period(), file.is_in_doubt());
-    let (doubts_lanes, hash) = (file.doubts_lanes(), file.hash());
-    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes, warnings, hash }))
+    let (doubts_lanes, doubts_sides, hash) = (file.doubts_lanes(), file.doubts_sides(), file.hash());
+    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes, doubts_sides, warnings, hash }))
 }

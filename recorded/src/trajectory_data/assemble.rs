@@ -2,7 +2,7 @@
 
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint};
 
-use super::continuity::FrameClock;
+use super::continuity::{FrameClock, is_jump};
 use super::data::RecordedTrack;
 use super::error::TrajectoryFileProblem;
 use super::source::{Clock, ReadError, Row};
@@ -28,8 +28,12 @@ pub(super) fn step(before: &Row, row: &Row, clock: FrameClock) -> Result<Step, R
     let (later, earlier) = if row.line > before.line { (row, before) } else { (before, row) };
     let (frames, step) = (row.frame - before.frame, row.time - before.time);
     if frames == 0 && (step == Time::ZERO || row.clock != Clock::MayRestart) {
-        let problem =
-            TrajectoryFileProblem::DuplicateRow { vehicle: row.number, frame: row.frame, first_line: earlier.line };
+        let (vehicle, frame, first_line) = (row.number, row.frame, earlier.line);
+        let problem = if is_jump(before, row) {
+            TrajectoryFileProblem::SharedNumber { vehicle, frame, first_line }
+        } else {
+            TrajectoryFileProblem::DuplicateRow { vehicle, frame, first_line }
+        };
         return Err(ReadError::new(later.line, problem));
     }
     let needed_ns = period.ns().saturating_mul(frames) / clock.frames;

@@ -10,7 +10,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 
-use closecall_traffic::{Time, VehicleClass, maths};
+use closecall_traffic::{Side, Time, VehicleClass, maths};
 
 use super::builder::PIECE_STRIDE;
 use super::class_names::{UnknownClass, UnknownClasses};
@@ -74,6 +74,16 @@ pub(super) enum Position {
     },
     /// On a road. A file may hold several. `s_m` is the centre of the vehicle's box.
     Road { road: u32, s_m: f64, d_m: f64, lane: u8 },
+}
+
+impl Position {
+    /// Returns `true` if the file states, apart from the point, which lane is to the left.
+    const fn names_sides(&self) -> bool {
+        match self {
+            Self::Road { .. } => true,
+            Self::Plane { named_lane, .. } => matches!(named_lane, Some(StatedLane { index: Some(_), .. })),
+        }
+    }
 }
 
 /// A row whose vehicle has an index instead of a number.
@@ -176,6 +186,8 @@ impl Collected {
         notes.extend(road.iter().flat_map(InferredRoad::warnings));
         let is_in_doubt = road.as_ref().is_some_and(InferredRoad::is_in_doubt);
         let is_mirrored = road.as_ref().is_some_and(InferredRoad::is_mirrored);
+        let oncoming_side = road.as_ref().and_then(InferredRoad::oncoming_side);
+        let names_sides = rows.iter().any(|row| row.position.names_sides());
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
         let mut jumps: Vec<LaneJump> = Vec::new();
@@ -257,7 +269,8 @@ impl Collected {
         let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
         let (items, unknown_classes) = (items.collect(), facts.unknown_classes);
         let lane_sides = LaneSides::default();
-        Ok(CollectedSource { items, info, notes, is_in_doubt, is_mirrored, unknown_classes, lane_sides })
+        let road = RoadFacts { is_in_doubt, is_mirrored, names_sides, oncoming_side };
+        Ok(CollectedSource { items, info, notes, road, unknown_classes, lane_sides })
     }
 }
 
@@ -483,11 +496,20 @@ pub(super) struct CollectedSource {
     items: VecDeque<Result<Row, ReadError>>,
     info: FileInfo,
     notes: Vec<String>,
+    road: RoadFacts,
+    unknown_classes: UnknownClasses,
+    lane_sides: LaneSides,
+}
+
+/// What the rows show of the road.
+#[derive(Clone, Copy, Debug)]
+struct RoadFacts {
     is_in_doubt: bool,
     /// `true` if lanes with higher indices lie further to the right, and no option says so.
     is_mirrored: bool,
-    unknown_classes: UnknownClasses,
-    lane_sides: LaneSides,
+    /// `true` if the file states, apart from its positions, which lane is to the left.
+    names_sides: bool,
+    oncoming_side: Option<Side>,
 }
 
 impl CollectedSource {
@@ -507,12 +529,20 @@ impl RowSource for CollectedSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let mirrored = self.is_mirrored.then(|| MIRRORED.to_owned());
+        let mirrored = self.road.is_mirrored.then(|| MIRRORED.to_owned());
         self.notes.iter().cloned().chain(mirrored).collect()
     }
 
     fn expect_mirrored(&mut self) {
-        self.is_mirrored = false;
+        self.road.is_mirrored = false;
+    }
+
+    fn names_sides(&self) -> bool {
+        self.road.names_sides
+    }
+
+    fn oncoming_side(&self) -> Option<Side> {
+        self.road.oncoming_side
     }
 
     fn check_lane_sides(&self, is_mirrored: bool) -> Result<(), ReadError> {
@@ -520,7 +550,7 @@ impl RowSource for CollectedSource {
     }
 
     fn is_in_doubt(&self) -> bool {
-        self.is_in_doubt || self.is_mirrored
+        self.road.is_in_doubt || self.road.is_mirrored
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

@@ -63,6 +63,8 @@ pub struct TrajectoryData {
     pub is_in_doubt: bool,
     /// Whether a warning says that the recorded lanes are none.
     pub doubts_lanes: bool,
+    /// Whether a warning says that left and right may be exchanged.
+    pub doubts_sides: bool,
     /// Unknown names of vehicle classes in the file.
     pub unknown_classes: Vec<UnknownClass>,
     /// What the reader of the file notes on its content.
@@ -102,6 +104,7 @@ impl TrajectoryData {
             hash: String::new(),
             is_in_doubt: false,
             doubts_lanes: false,
+            doubts_sides: false,
             unknown_classes: Vec::new(),
             notes: Vec::new(),
             continuity: Continuity::default(),

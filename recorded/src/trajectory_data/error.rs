@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use closecall_traffic::words::counted;
+
 use super::file_layout::Layout;
 use super::markings::LANE_WIDTHS_M;
 
@@ -120,7 +122,8 @@ pub enum TrajectoryFileProblem {
     /// The first line fits none of the layouts.
     #[error(
         "the first line is neither a header of the plain layout (`track_id, frame, time_s, s_m, …`) or of NGSIM's \
-         (`Vehicle_ID, Frame_ID, …`), nor a row of NGSIM's 18 columns; it has {columns} columns and starts with `{start}`"
+         (`Vehicle_ID, Frame_ID, …`), nor a row of NGSIM's 18 columns; it has {} and starts with `{start}`",
+        counted(*columns, "column")
     )]
     UnknownLayout {
         /// Number of columns found.
@@ -210,6 +213,19 @@ pub enum TrajectoryFileProblem {
         "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed"
     )]
     DuplicateRow {
+        /// Number of the vehicle or track.
+        vehicle: u64,
+        /// Frame number.
+        frame: i64,
+        /// Line of the first of the two rows.
+        first_line: u64,
+    },
+    /// A vehicle is in two places in the same frame.
+    #[error(
+        "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}, where the vehicle is at another place: the \
+         number belongs to several vehicles"
+    )]
+    SharedNumber {
         /// Number of the vehicle or track.
         vehicle: u64,
         /// Frame number.
@@ -609,6 +625,9 @@ pub enum TrajectoryFileProblem {
     },
 }
 
+/// The category of rows of [`TrajectoryFileProblem::SharedNumber`].
+pub(super) const SHARED_NUMBERS: &str = "rows of several vehicles with one number";
+
 impl TrajectoryFileProblem {
     /// Returns `true` if the problem makes only one row unusable.
     pub fn affects_one_row(&self) -> bool {
@@ -622,6 +641,7 @@ impl TrajectoryFileProblem {
                 | Self::HeadingUnit { .. }
                 | Self::NoMarkings { .. }
                 | Self::DuplicateRow { .. }
+                | Self::SharedNumber { .. }
                 | Self::UnevenTime { .. }
                 | Self::TimeBackwards { .. }
                 | Self::OffClock { .. }
@@ -653,6 +673,7 @@ impl TrajectoryFileProblem {
             | Self::HeadingUnit { .. }
             | Self::NoMarkings { .. } => "values that are not allowed",
             Self::DuplicateRow { .. } => "duplicated rows",
+            Self::SharedNumber { .. } => SHARED_NUMBERS,
             Self::UnevenTime { .. } | Self::OffClock { .. } => "times off the clock",
             Self::TimeBackwards { .. } => "times that go back",
             Self::OtherCount { .. } => "vehicles with rows missing",

@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufRead;
 use std::path::Path;
 
-use closecall_traffic::Time;
+use closecall_traffic::{Side, Time};
 
 use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::MarkingDistances;
@@ -360,6 +360,14 @@ impl TextLayout for ExidColumns {
 
     fn is_in_doubt(&self) -> bool {
         self.road.is_in_doubt()
+    }
+
+    fn names_sides(&self) -> bool {
+        self.columns.lane_offset.is_some()
+    }
+
+    fn oncoming_side(&self) -> Option<Side> {
+        self.road.oncoming_side()
     }
 
     fn check_sides(&self, is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {

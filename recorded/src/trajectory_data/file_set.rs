@@ -215,6 +215,7 @@ fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, FieldError>) -
     let header = Header::new((0..fields.len()).map(|index| fields.get(first, index)));
     let needed = fields.len();
     let mut numbered_rows = Vec::new();
+    let mut usual_last_field = 0;
     while let Some((number, line)) = lines.next().map_err(at_line)? {
         fields.split(line, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
         if fields.len() != needed {
@@ -222,9 +223,11 @@ fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, FieldError>) -
         }
         let row = read(&Cells { header: &header, line, fields: &fields });
         numbered_rows.push((number, row.map_err(|error| ReadError::new(number, error))?));
-        if lines.is_unterminated() {
+        let last_field = fields.last_len();
+        if lines.is_unterminated() && last_field < usual_last_field {
             return Err(ReadError::new(number, TrajectoryFileProblem::CutLine));
         }
+        usual_last_field = last_field;
     }
     if numbered_rows.is_empty() {
         return Err(ReadError::of_file(TrajectoryFileProblem::Empty));

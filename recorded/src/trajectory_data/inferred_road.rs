@@ -34,7 +34,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::statistics::quantiles::median;
-use closecall_traffic::{Lane, maths};
+use closecall_traffic::{Lane, Side, maths};
 
 use super::error::TrajectoryFileProblem;
 use super::estimated_lanes::LEAST_VEHICLES;
@@ -105,6 +105,15 @@ const MOST_CHOICES: usize = 8;
 /// Number of times that the reference line is moved to the axis of the road: after each time,
 /// positions are measured from a better line.
 const AXIS_TURNS: usize = 3;
+
+/// Cosine of the smallest angle between two directions of one road, 150° (-).
+const OPPOSITE: f64 = -0.866;
+/// Largest distance to the other carriageway (m): that of a motorway with a wide median. An assumption with
+/// a plausible range of 30 to 100 m.
+const OTHER_CARRIAGEWAY_M: f64 = 60.0;
+/// Share of the oncoming rows that are on one side of a direction (-): a road that turns back may have some on the
+/// other side. An assumption with a plausible range of 0.7 to 0.95.
+const ON_ONE_SIDE: f64 = 0.8;
 
 /// The doubt about a file whose indices grow to the right, unless its reader is told that it is mirrored.
 pub(super) const MIRRORED: &str = "lanes with higher indices lie further to the right, but the layout counts them from the right: the file is mirrored, \
@@ -217,6 +226,8 @@ pub(super) struct InferredRoad {
     doubts: Vec<String>,
     /// `true` if lanes with higher indices lie further to the right.
     is_mirrored: bool,
+    /// The side on which vehicles pass the oncoming traffic, if the data show it.
+    oncoming_side: Option<Side>,
 }
 
 /// The path of one vehicle.
@@ -259,8 +270,8 @@ impl InferredRoad {
         });
         let directions: Vec<Direction> = directions.collect();
         let states_lane_width = stated_width_m.is_some();
-        let (astray, doubts, is_mirrored) = (0.0, Vec::new(), false);
-        let mut road = Self { lane_width_m, states_lane_width, directions, astray, doubts, is_mirrored };
+        let (astray, doubts, is_mirrored, oncoming_side) = (0.0, Vec::new(), false, None);
+        let mut road = Self { lane_width_m, states_lane_width, directions, astray, doubts, is_mirrored, oncoming_side };
         if road.directions.is_empty() {
             return Ok(Err(TrajectoryFileProblem::NothingMoves));
         }
@@ -270,7 +281,36 @@ impl InferredRoad {
             return Ok(Err(TrajectoryFileProblem::NoRoad { percent: 100.0 * road.astray }));
         }
         road.compare_lanes(&mut each_row)?;
+        road.oncoming_side = road.side_of_oncoming_traffic(&mut each_row)?;
         Ok(Ok(road))
+    }
+
+    /// Returns the side on which vehicles pass the oncoming traffic, if nearly all of it is on one side.
+    fn side_of_oncoming_traffic<E>(
+        &self,
+        each_row: &mut impl FnMut(&mut dyn FnMut(Pose)) -> Result<(), E>,
+    ) -> Result<Option<Side>, E> {
+        let is_opposite = |a: &Direction, b: &Direction| maths::cos(a.heading_rad - b.heading_rad) < OPPOSITE;
+        let opposite = |of: &Direction| self.directions.iter().find(|other| is_opposite(of, other));
+        if !self.directions.iter().any(|direction| opposite(direction).is_some()) {
+            return Ok(None);
+        }
+        let (mut left, mut right) = (0_u64, 0_u64);
+        let mut vehicles: BTreeSet<u64> = BTreeSet::new();
+        let mut kept = KeptDirection::default();
+        each_row(&mut |pose| {
+            let direction = kept.choose(&pose, self).map(|index| &self.directions[index]);
+            let Some(other) = direction.and_then(opposite) else { return };
+            let Projection { s_m, d_m, heading_rad } = other.line.project(pose.point);
+            let is_beside = (0.0..=other.line.length_m().unwrap_or(0.0)).contains(&s_m);
+            if is_beside && d_m.abs() <= OTHER_CARRIAGEWAY_M && maths::cos(pose.heading_rad - heading_rad) < OPPOSITE {
+                *(if d_m > 0.0 { &mut left } else { &mut right }) += 1;
+                vehicles.insert(pose.vehicle);
+            }
+        })?;
+        let is_most = |rows: u64| rows as f64 > ON_ONE_SIDE * (left + right) as f64;
+        let side = if left > right { Side::Left } else { Side::Right };
+        Ok((vehicles.len() >= LEAST_MOVING && is_most(left.max(right))).then_some(side))
     }
 
     /// Joins the named lanes that follow one another, and moves the reference lines to the axes that
@@ -481,6 +521,11 @@ impl InferredRoad {
     /// Returns `true` if lanes with higher indices lie further to the right.
     pub(super) fn is_mirrored(&self) -> bool {
         self.is_mirrored
+    }
+
+    /// Returns the side on which vehicles pass the oncoming traffic, if the data show it.
+    pub(super) fn oncoming_side(&self) -> Option<Side> {
+        self.oncoming_side
     }
 
     /// Returns `true` if the lanes of the road are in doubt, as a warning says.

@@ -103,6 +103,7 @@ mod reference_line;
 mod road_axis;
 mod rows;
 mod side_by_side;
+mod sides;
 mod skipped_rows;
 mod source;
 mod stated_lanes;

@@ -55,8 +55,8 @@ struct Segment {
     start: Vertex,
     end: Vertex,
     length_m: f64,
-    /// Heading of the segment (rad).
-    heading_rad: f64,
+    /// Direction of the segment (-).
+    direction: (f64, f64),
     /// Position of the point along the segment and to its left (m).
     along_m: f64,
     left_m: f64,
@@ -74,7 +74,7 @@ impl Segment {
             start,
             end,
             length_m,
-            heading_rad: maths::atan2(uy, ux),
+            direction: (ux, uy),
             along_m: dx * ux + dy * uy,
             left_m: ux * dy - uy * dx,
             is_first: false,
@@ -113,7 +113,8 @@ impl Segment {
         Projection {
             s_m: self.start.s_m + along_m,
             d_m: maths::hypot(self.along_m - along_m, self.left_m).copysign(self.left_m),
-            heading_rad: self.heading_rad + turned_rad,
+            // A search asks one segment of many for its heading.
+            heading_rad: maths::atan2(self.direction.1, self.direction.0) + turned_rad,
         }
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::error::SHARED_NUMBERS;
 use super::source::ReadError;
 
 /// The skipped rows, grouped by reason.
@@ -47,6 +48,11 @@ impl SkippedRows {
     /// Returns the number of skipped rows.
     pub fn count(&self) -> u64 {
         self.reasons.values().map(|rows| rows.count).sum()
+    }
+
+    /// Returns the number of skipped rows whose vehicle is at another place in the same frame.
+    pub(super) fn of_shared_numbers(&self) -> u64 {
+        self.reasons.get(SHARED_NUMBERS).map_or(0, |rows| rows.count)
     }
 
     /// Removes and returns the first error.

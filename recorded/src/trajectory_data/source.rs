@@ -11,7 +11,7 @@
 //! files of a highD or exiD data set. A CommonRoad reader also holds the lanelets, which precede
 //! the obstacles in the file.
 
-use closecall_traffic::{Time, VehicleClass};
+use closecall_traffic::{Side, Time, VehicleClass};
 
 use super::class_names::UnknownClass;
 use super::data::MarkingDistances;
@@ -102,6 +102,16 @@ pub(super) trait RowSource {
     /// They contradict them.
     fn check_lane_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
         Ok(())
+    }
+
+    /// Returns `true` if the file states, apart from its positions, which lane is to the left.
+    fn names_sides(&self) -> bool {
+        true
+    }
+
+    /// Returns the side on which vehicles pass the oncoming traffic, if the positions show it.
+    fn oncoming_side(&self) -> Option<Side> {
+        None
     }
 
     /// States that the position along the road falls in the direction of travel, so that speeds may be

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::io::BufRead;
 
+use closecall_traffic::Side;
+
 use super::class_names::UnknownClass;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::fields::FieldError;
@@ -122,6 +124,14 @@ impl<R: BufRead> RowSource for TextSource<R> {
 
     fn expect_reversed(&mut self) {
         self.format.columns.expect_reversed();
+    }
+
+    fn names_sides(&self) -> bool {
+        self.format.columns.names_sides()
+    }
+
+    fn oncoming_side(&self) -> Option<Side> {
+        self.format.columns.oncoming_side()
     }
 
     fn expect_no_lanes(&mut self) {

@@ -1,5 +1,7 @@
 //! The interface of the text layouts, which have one row per line.
 
+use closecall_traffic::Side;
+
 use super::class_names::UnknownClass;
 use super::error::TrajectoryFileProblem;
 use super::fields::FieldError;
@@ -43,6 +45,16 @@ pub(super) trait TextLayout {
     /// Returns the columns that contradict it.
     fn check_sides(&self, _is_mirrored: bool) -> Result<(), TrajectoryFileProblem> {
         Ok(())
+    }
+
+    /// Returns `true` if the file states, apart from its positions, which lane is to the left.
+    fn names_sides(&self) -> bool {
+        true
+    }
+
+    /// Returns the side on which vehicles pass the oncoming traffic, if the positions show it.
+    fn oncoming_side(&self) -> Option<Side> {
+        None
     }
 
     /// States that the position along the road falls in the direction of travel, so that speeds may be

@@ -22,6 +22,7 @@ use super::ngsim;
 use super::order::{WINDOW_ROWS, order_of};
 use super::plausible;
 use super::side_by_side::SideBySide;
+use super::sides::Sides;
 use super::skipped_rows::SkippedRows;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use crate::lane_change::LaneReliability;
@@ -47,6 +48,10 @@ const LONGEST_PERIOD: Time = Time::from_ms(300);
 
 /// Smallest number of unusable rows that can be most of a file: fewer rows are damaged ones.
 const LEAST_BAD_ROWS: u64 = 20;
+
+/// One in this number of rows may be left out because its number belongs to another vehicle, too, before lane changes
+/// are missing. An assumption with a plausible range of 20 to 1,000.
+const ONE_SHARED_IN: u64 = 100;
 
 /// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -147,6 +152,8 @@ pub struct Tracks<'a> {
     lane_doubt: Option<String>,
     /// Why the times, the positions or the speeds are in doubt.
     speed_doubt: Option<String>,
+    /// What shows which side is left.
+    sides: Sides,
     /// `true` if the file is of a simulation, in which a lane change may take a single step.
     is_simulated: bool,
     /// `true` if it changes lanes in single steps, which no distance between frames hides.
@@ -194,6 +201,7 @@ impl<'a> Tracks<'a> {
             axis_warning: None,
             lane_doubt: None,
             speed_doubt: None,
+            sides: Sides::Shown,
             is_simulated: false,
             jumps_to_lanes: false,
             lanes: options.lanes,
@@ -287,13 +295,19 @@ impl<'a> Tracks<'a> {
     /// wrong or missing, or that the recorded lanes are none.
     pub fn is_in_doubt(&self) -> bool {
         let is_of_file = self.doubts_lanes() || self.speed_doubt.is_some() || self.source.is_in_doubt();
-        is_of_file || self.is_coarse() || self.continuity().hides_lane_changes()
+        let are_missing = ONE_SHARED_IN * self.dropped.of_shared_numbers() > self.rows;
+        is_of_file || are_missing || self.sides.is_doubt() || self.is_coarse() || self.continuity().hides_lane_changes()
     }
 
     /// Returns `true` if a warning says that the recorded lanes are none: vehicles of one lane drive
     /// beside each other.
     pub fn doubts_lanes(&self) -> bool {
         self.lane_doubt.is_some()
+    }
+
+    /// Returns `true` if a warning says that left and right may be exchanged.
+    pub fn doubts_sides(&self) -> bool {
+        self.sides != Sides::Shown
     }
 
     /// Returns the rows skipped so far.
@@ -328,8 +342,17 @@ impl<'a> Tracks<'a> {
             )
         });
         let coarse = self.is_coarse().then(|| coarse_frames(self.mean_period()));
-        let doubts = self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).cloned();
-        let notes = self.source.warnings().into_iter().chain(doubts);
+        let sides = self.sides.warning().map(str::to_owned);
+        let doubts = self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).cloned().chain(sides);
+        let shared = self.dropped.of_shared_numbers();
+        let shared = (shared > 0).then(|| {
+            format!(
+                "{shared} of {} rows were left out because their vehicle is at another place in the same frame: a number belongs to \
+                 several vehicles, of which only one is read",
+                self.rows
+            )
+        });
+        let notes = self.source.warnings().into_iter().chain(doubts).chain(shared);
         notes.chain(coarse).chain(unknown_lanes).collect()
     }
 
@@ -365,7 +388,7 @@ impl<'a> Tracks<'a> {
         }
         let (hash, continuity) = (self.hash(), self.continuity());
         let (notes, lanes, is_in_doubt) = (self.notes(), self.lanes(), self.is_in_doubt());
-        let doubts_lanes = self.doubts_lanes();
+        let (doubts_lanes, doubts_sides) = (self.doubts_lanes(), self.doubts_sides());
         if let Some(estimated) = self.estimated_markings() {
             data.markings = estimated;
         }
@@ -377,6 +400,7 @@ impl<'a> Tracks<'a> {
             lanes,
             is_in_doubt,
             doubts_lanes,
+            doubts_sides,
             unknown_classes: self.unknown_classes().to_vec(),
             ..data
         })
@@ -508,6 +532,7 @@ impl<'a> Tracks<'a> {
         if self.lanes == LaneReliability::Reliable {
             self.source.check_lane_sides(self.axis_options.mirror_d)?;
         }
+        self.sides = Sides::of(beginning, &*self.source, self.axis_options.mirror_d);
         if states_lanes && self.lanes == LaneReliability::Reliable {
             let side_by_side = SideBySide::of(beginning);
             side_by_side.check(layout)?;

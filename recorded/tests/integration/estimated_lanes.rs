@@ -116,6 +116,20 @@ fn a_plain_file_without_lanes_is_read_if_they_are_to_be_estimated() {
 }
 
 #[test]
+fn positions_to_the_left_of_the_left_edge_are_in_doubt_because_they_may_be_mirrored() {
+    let mut vehicles = traffic(0.0);
+    vehicles.push(changes(1.0, 0.0));
+    let data = read_without_lanes(&vehicles);
+    assert!(!data.is_in_doubt && !data.doubts_sides, "{:?}", data.notes);
+    let mirrored: Vec<Lateral> =
+        vehicles.into_iter().map(|right_m| Box::new(move |time_s| -right_m(time_s)) as Lateral).collect();
+    let data = read_without_lanes(&mirrored);
+    assert_eq!(listed(&detect(&smooth(&data)))[0].1, Side::Right);
+    assert!(data.is_in_doubt && data.doubts_sides, "{:?}", data.notes);
+    assert!(data.notes.iter().any(|note| note.contains("mirrored")), "{:?}", data.notes);
+}
+
+#[test]
 fn a_road_that_does_not_begin_at_zero_has_its_lanes_where_its_vehicles_drive() {
     let mut vehicles = traffic(-21.4);
     vehicles.push(Box::new(|time_s| changes(1.0, 0.0)(time_s) - 21.2));

@@ -161,6 +161,26 @@ fn rewrite_rows(folder: &Path, change: impl Fn(&mut Vec<String>)) {
 }
 
 #[test]
+fn metadata_of_highd_without_a_last_line_end_are_read_and_cut_ones_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let clean = read(folder.path()).unwrap();
+    for name in ["07_recordingMeta.csv", "07_tracksMeta.csv"] {
+        let path = folder.path().join(name);
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.trim_end()).unwrap();
+        assert_eq!(read(folder.path()).unwrap().trajectories, clean.trajectories, "{name}");
+    }
+    let path = folder.path().join("07_tracksMeta.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let cut = text.trim_end().rsplit_once(',').unwrap().0.to_owned();
+    std::fs::write(&path, cut.clone() + ",").unwrap();
+    assert!(read(folder.path()).unwrap_err().to_string().contains("07_tracksMeta.csv"));
+    std::fs::write(&path, cut).unwrap();
+    assert!(read(folder.path()).unwrap_err().to_string().contains("07_tracksMeta.csv"));
+}
+
+#[test]
 fn a_mirrored_carriageway_of_highd_is_refused_and_the_named_option_mends_it() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());

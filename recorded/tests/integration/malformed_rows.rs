@@ -3,7 +3,9 @@
 
 use std::path::Path;
 
-use closecall_recorded::trajectory_data::{AxisOptions, BadRows, ReadOptions, TrajectoryFileError, open_from};
+use closecall_recorded::trajectory_data::{
+    AxisOptions, BadRows, ReadOptions, TrajectoryFileError, TrajectoryFileProblem, open_from,
+};
 
 use crate::support::{PLAIN_HEADER, assert_mentions, read_text};
 
@@ -147,6 +149,30 @@ fn bad_rows_are_skipped_and_counted_on_request() {
         [("cut rows", 1, Some(21)), ("duplicated rows", 1, Some(6)), ("values that are not allowed", 1, Some(10))];
     assert_eq!(dropped, expected);
     assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "by default a bad row ends the reading");
+}
+
+#[test]
+fn a_number_of_two_vehicles_at_once_is_refused_by_that_reason_and_in_doubt_if_its_rows_are_skipped() {
+    let text = drive(|_| {});
+    let shared = |vehicles: usize| {
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        for number in 1..=vehicles {
+            let mut fields: Vec<String> = lines[number].split(',').map(str::to_owned).collect();
+            fields[5] = format!("{}", fields[5].parse::<f64>().unwrap() + 50.0);
+            lines.push(fields.join(","));
+        }
+        lines.join("\n") + "\n"
+    };
+    let error = read_text(shared(1).as_bytes()).unwrap_err();
+    assert!(matches!(error.problem, TrajectoryFileProblem::SharedNumber { .. }), "{error}");
+    assert!(error.to_string().contains("belongs to several vehicles"), "{error}");
+    let options = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
+    let text = shared(5);
+    let tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), options, usize::MAX).unwrap();
+    let data = tracks.collect_all().unwrap();
+    assert_eq!(data.trajectories, read_text(drive(|_| {}).as_bytes()).unwrap().trajectories);
+    assert!(data.is_in_doubt, "{:?}", data.notes);
+    assert!(data.notes.iter().any(|note| note.starts_with("5 of 45 rows were left out")), "{:?}", data.notes);
 }
 
 #[test]

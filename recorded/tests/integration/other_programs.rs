@@ -378,6 +378,63 @@ fn headings_in_other_axes_than_the_positions_are_refused_by_that_reason() {
     );
 }
 
+/// Three lanes without names, in which vehicle 2 changes to the left, and, if `is_two_way`, oncoming traffic
+/// beside them.
+fn unnamed_road(is_two_way: bool, is_mirrored: bool) -> String {
+    let sense = if is_mirrored { -1.0 } else { 1.0 };
+    let mut text = "<fcd-export>\n".to_owned();
+    for time_s in times_s() {
+        writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
+        for number in 1..=36_u32 {
+            let is_oncoming = number.is_multiple_of(2) && number > 2;
+            if is_oncoming && !is_two_way {
+                continue;
+            }
+            let tau = if number == 2 { ((time_s - 4.0) / 4.0).clamp(0.0, 1.0) } else { 0.0 };
+            let share = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+            let right_m = VISSIM_LANE_M * (f64::from(number % 3) + 0.5 - share);
+            let (along_m, angle) = (10.0 * f64::from(number) + 28.0 * time_s, 90);
+            let (x_m, y_m, angle) =
+                if is_oncoming { (900.0 - along_m, 6.0 + right_m, angle + 180) } else { (along_m, -right_m, angle) };
+            writeln!(
+                text,
+                "<vehicle id=\"{number}\" x=\"{x_m:.3}\" y=\"{:.3}\" angle=\"{angle}\" type=\"car\" speed=\"28\"/>",
+                sense * y_m
+            )
+            .unwrap();
+        }
+        text += "</timestep>\n";
+    }
+    text + "</fcd-export>\n"
+}
+
+#[test]
+fn the_oncoming_traffic_shows_which_side_is_left_and_without_it_a_warning_says_that_nothing_does() {
+    let axes = AxisOptions { mirror_d: true, lanes_from_right: true, ..AxisOptions::default() };
+    let turned = ReadOptions { axes, ..ReadOptions::default() };
+    let read = |is_two_way, is_mirrored, options| {
+        let text = unnamed_road(is_two_way, is_mirrored);
+        let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
+        let data = tracks.and_then(|tracks| tracks.collect_all()).unwrap();
+        let changes = detect(&smooth(&data));
+        let [change] = &changes[..] else { panic!("{changes:?}") };
+        (change.direction, data.doubts_sides, data.is_in_doubt, data.notes.join("\n"))
+    };
+    let (side, doubts_sides, is_in_doubt, notes) = read(true, false, ReadOptions::default());
+    assert_eq!((side, doubts_sides, is_in_doubt), (Side::Left, false, false), "{notes}");
+    let (side, doubts_sides, is_in_doubt, notes) = read(true, true, ReadOptions::default());
+    assert_eq!((side, doubts_sides, is_in_doubt), (Side::Right, true, true), "{notes}");
+    assert!(notes.contains("the oncoming traffic is on the right"), "{notes}");
+    let (side, doubts_sides, is_in_doubt, notes) = read(true, true, turned);
+    assert_eq!((side, doubts_sides, is_in_doubt), (Side::Left, false, false), "{notes}");
+    // What is turned although it is right is in doubt, too.
+    assert!(read(true, false, turned).2);
+    let (_, doubts_sides, is_in_doubt, notes) = read(false, false, ReadOptions::default());
+    assert_eq!((doubts_sides, is_in_doubt), (true, false), "{notes}");
+    assert!(notes.contains("which side is left"), "{notes}");
+    assert!(!read(false, true, turned).1, "the caller states it");
+}
+
 #[test]
 fn without_lanes_the_longest_path_of_a_lane_changer_is_no_reference_line() {
     let mut text = "<fcd-export>\n".to_owned();
