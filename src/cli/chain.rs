@@ -49,7 +49,7 @@ use super::campaign::{Companion, Planned, carry_out};
 use super::ending::EndArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
-use super::output::{made_by, print_error};
+use super::output::{made_by, print_error, warn};
 use super::protect::{must_be_folder, of_trajectories, protect};
 use super::results::{ArtifactArgs, ResultsArgs};
 use crate::exit_code::ExitCode;
@@ -145,6 +145,7 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
     };
     let gates = args.gates.or_measure()?.gates(true, Design::Random, None)?;
     let smoothed = smooth_noting(&args.data)?;
+    let is_in_doubt = smoothed.iter().any(|file| file.is_in_doubt);
     let recordings: Vec<Recording> =
         args.data.files.iter().zip(smoothed).map(|(path, file)| Recording::new(path, file)).collect();
     let mut chain = Chain::new(recordings, usize::from(args.encounters), &args.out)?;
@@ -174,7 +175,12 @@ pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
         first: EarlierFailures::default(),
         can_draw_seed: false,
     };
-    carry_out(&planned, &mut chain, &mut |conclusion| conclusion.print(args.format))
+    let code = carry_out(&planned, &mut chain, &mut |conclusion| conclusion.print(args.format))?;
+    if is_in_doubt && code == ExitCode::Pass {
+        warn("a trajectory file is in doubt, so that its encounters may not have happened as the scenarios say");
+        return Ok(ExitCode::Inconclusive);
+    }
+    Ok(code)
 }
 
 impl Recording {
