@@ -401,7 +401,7 @@ fn first_refuted(summary: &Summary, check: Invariance) -> String {
     let cause = summary.foreign_controller(arm).filter(|_| check.is_of_repeatability()).map_or_else(String::new, |foreign| {
         format!(
             "; the likely cause is {foreign}, which is not built in: a controller gives the same answers to the same \
-             inputs, without random numbers, a clock, or state of another run"
+             inputs, without random numbers, a clock, its process number, or state of another run"
         )
     });
     format!(", first in sample {sample} of {name} with {controller}{cause}")
