@@ -42,6 +42,19 @@ fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
 }
 
 #[test]
+fn init_asks_to_fill_in_only_what_a_job_lacks() {
+    let folder = folder();
+    let first =
+        stderr(&run_in(folder.path(), &["init", "--url", "https://example.org/closecall.git", "--rev", "v0.1.0"]));
+    assert!(!first.contains("fill in"), "{first}");
+    let again = stderr(&run_in(folder.path(), &["init"]));
+    assert!(again.contains("kept: ./.gitlab-ci.yml") && !again.contains("fill in"), "{again}");
+    std::fs::remove_file(folder.path().join(".gitlab-ci.yml")).unwrap();
+    let anew = stderr(&run_in(folder.path(), &["init"]));
+    assert!(anew.contains("fill in: CLOSECALL_URL"), "{anew}");
+}
+
+#[test]
 fn new_and_init_overwrite_nothing() {
     let folder = folder();
     std::fs::write(folder.path().join("mine.toml"), "own").unwrap();
@@ -218,6 +231,12 @@ fn a_misspelt_or_negative_value_is_explained() {
             ["study", "sensitivity", "paper-figure", "--rows=9999999"],
             "'9999999' for '--rows <N>': `9999999` is not a whole number from 1 to 2097152",
         ),
+        (["study", "boundary", "paper-figure", "--runs=x"], "`x` is not a whole number from 30 to 200"),
+        (["view", "results", "--port", "65536"], "`65536` is not a whole number from 0 to 65535"),
+        (["study", "perceive", "scans.pcd", "--intensity-scale=1e300"], "a number above 0 and up to 3.4028235e38"),
+        (["campaign", "paper-figure", "--check-share", "2"], "`2` is not a number above 0 and up to 1"),
+        (["campaign", "paper-figure", "--check-share", "0"], "`0` is not a number above 0 and up to 1"),
+        (["campaign", "paper-figure", "--max-jerk", "1e400"], "`1e400` is not a finite number above 0"),
         (
             ["run", "paper-figur", "--seed", "1"],
             "there is no scenario `paper-figur`: no file and no scenario of the library",
@@ -231,12 +250,6 @@ fn a_misspelt_or_negative_value_is_explained() {
 }
 
 #[test]
-        (["study", "boundary", "paper-figure", "--runs=x"], "`x` is not a whole number from 30 to 200"),
-        (["view", "results", "--port", "65536"], "`65536` is not a whole number from 0 to 65535"),
-        (["study", "perceive", "scans.pcd", "--intensity-scale=1e300"], "a number above 0 and up to 3.4028235e38"),
-        (["campaign", "paper-figure", "--check-share", "2"], "`2` is not a number above 0 and up to 1"),
-        (["campaign", "paper-figure", "--check-share", "0"], "`0` is not a number above 0 and up to 1"),
-        (["campaign", "paper-figure", "--max-jerk", "1e400"], "`1e400` is not a finite number above 0"),
 fn a_wrong_path_is_named_with_what_it_is() {
     let folder = folder();
     let path = folder.path().to_str().unwrap();
