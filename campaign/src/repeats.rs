@@ -4,7 +4,7 @@
 //! the parameters of an earlier one, or its outcome in every arm, shows the same encounter once
 //! more. Three hundred such samples are one sample.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use closecall_scenarios::outcome::Outcome;
@@ -51,8 +51,10 @@ enum Same {
 pub(crate) struct Repeats {
     /// By what samples repeat each other; `None` if every one counts, because no parameter varies.
     by: Option<Same>,
-    /// Whether some vehicle has collided in the arm under test in a sample of this key.
-    collided: HashMap<u64, bool>,
+    /// The keys of the samples.
+    seen: HashSet<u64>,
+    /// The keys of samples in which some vehicle collided in the arm under test.
+    collided: HashSet<u64>,
 }
 
 impl Repeats {
@@ -62,7 +64,7 @@ impl Repeats {
             Variation::Discrete => Some(Same::Parameters),
             Variation::Continuous => Some(Same::Outcome),
         };
-        Self { by, collided: HashMap::new() }
+        Self { by, ..Self::default() }
     }
 
     /// Returns true if a sample counts: it is new, it ended in an error, or it is the first one of
@@ -80,16 +82,10 @@ impl Repeats {
             Same::Parameters => key(&tested.parameters).hash(&mut hasher),
             Same::Outcome => outcomes.iter().for_each(|outcome| hash(outcome, &mut hasher)),
         }
-        match self.collided.entry(hasher.finish()) {
-            std::collections::hash_map::Entry::Occupied(mut entry) => {
-                let collided = entry.get_mut();
-                !std::mem::replace(collided, *collided || collides) && collides
-            }
-            std::collections::hash_map::Entry::Vacant(vacant) => {
-                vacant.insert(collides);
-                true
-            }
-        }
+        let key = hasher.finish();
+        let is_new = self.seen.insert(key);
+        let is_first_collision = collides && self.collided.insert(key);
+        is_new || is_first_collision
     }
 }
 
