@@ -196,12 +196,17 @@ fn steps(rows: &[Row], clock: FrameClock) -> Vec<RoadStep> {
     let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
     let mut steps = Vec::new();
     for row in rows {
-        let Some(before) = latest.insert((row.number, row.origin), row) else { continue };
+        let vehicle = (row.number, row.origin);
+        // A second row of a frame is refused by that reason later.
+        if latest.get(&vehicle).is_some_and(|before| before.frame == row.frame) {
+            continue;
+        }
+        let Some(before) = latest.insert(vehicle, row) else { continue };
         let (time_s, speed_mps) = ((row.time - before.time).s(), 0.5 * (row.speed_mps + before.speed_mps));
         let follows = row.frame == before.frame + clock.frames && time_s > 0.0;
         if follows && speed_mps > MIN_SPEED_MPS {
             let ratio = (row.s_m - before.s_m) / (speed_mps * time_s);
-            steps.push(RoadStep { vehicle: (row.number, row.origin), ratio, line: row.line });
+            steps.push(RoadStep { vehicle, ratio, line: row.line });
         }
     }
     steps

@@ -44,6 +44,9 @@ const WIDTH_PAIRS: usize = 8;
 /// 2.5 m, and above half of a wide one, 4.2 m; above the widest lane, 5.5 m.
 const DISTANCES_M: std::ops::RangeInclusive<f64> = 2.2..=6.0;
 
+/// One in this number of pairs of vehicles that overlap along the road may be closer than neighbouring lanes.
+const CLOSEST: usize = 10;
+
 /// Least number of vehicles that show that lanes are not recorded.
 const LEAST_VEHICLES: usize = 8;
 /// Share of the vehicles with another one beside them in their lane above which lanes are in doubt
@@ -217,6 +220,35 @@ impl SideBySide {
     }
 }
 
+/// Returns why the unit of the lateral position is in doubt, whatever the recorded lanes are: vehicles that
+/// overlap along the road are further apart than neighbouring lanes.
+pub(super) fn doubt_of_unit(rows: &[Row]) -> Option<String> {
+    let mut sorted: Vec<&Row> = rows.iter().take(ENOUGH_ROWS).collect();
+    sorted.sort_by(|a, b| (a.origin, a.time).cmp(&(b.origin, b.time)).then(a.s_m.total_cmp(&b.s_m)));
+    let mut pairs: BTreeMap<[Vehicle; 2], Mean> = BTreeMap::new();
+    for instant in sorted.chunk_by(|a, b| (a.origin, a.time) == (b.origin, b.time)) {
+        for (index, rear) in instant.iter().enumerate() {
+            for front in instant[index + 1..].iter().take(COMPARED) {
+                let overlaps = front.s_m - rear.s_m < 0.5 * (front.length_m + rear.length_m);
+                if overlaps && rear.vehicle_id != front.vehicle_id {
+                    let pair = [vehicle(rear).min(vehicle(front)), vehicle(rear).max(vehicle(front))];
+                    pairs.entry(pair).or_default().add((rear.d_m - front.d_m).abs());
+                }
+            }
+        }
+    }
+    let mut apart_m: Vec<f64> = pairs.values().map(|apart| apart.get_m()).collect();
+    apart_m.sort_by(f64::total_cmp);
+    let closest_m = *apart_m.get(apart_m.len() / CLOSEST).filter(|_| apart_m.len() >= WIDTH_PAIRS)?;
+    (closest_m > *DISTANCES_M.end()).then(|| {
+        format!(
+            "vehicles beside each other are {closest_m:.1} m apart or more, but lanes are up to {} m wide: the lateral position has \
+             another unit",
+            LANE_WIDTHS_M.end()
+        )
+    })
+}
+
 fn vehicle(row: &Row) -> Vehicle {
     Vehicle { origin: row.origin, number: row.vehicle_id }
 }
@@ -226,11 +258,16 @@ mod tests {
     use std::fmt::Write;
     use std::path::Path;
 
+    use crate::lane_change::LaneReliability;
     use crate::trajectory_data::{ReadOptions, TrajectoryData, TrajectoryFileProblem, open_from};
 
     /// Reads a file with vehicles side by side, three in each of these lanes at these positions to the
     /// right.
     fn read(lanes: &[(u8, f64)]) -> Result<TrajectoryData, TrajectoryFileProblem> {
+        read_with(lanes, LaneReliability::Reliable)
+    }
+
+    fn read_with(lanes: &[(u8, f64)], reliability: LaneReliability) -> Result<TrajectoryData, TrajectoryFileProblem> {
         let mut text =
             "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
         for (index, (lane, d_m)) in lanes.iter().enumerate() {
@@ -242,7 +279,8 @@ mod tests {
                 }
             }
         }
-        let tracks = open_from(text.as_bytes(), Path::new("a.csv"), ReadOptions::default(), usize::MAX);
+        let options = ReadOptions { lanes: reliability, ..ReadOptions::default() };
+        let tracks = open_from(text.as_bytes(), Path::new("a.csv"), options, usize::MAX);
         tracks.and_then(|tracks| tracks.collect_all()).map_err(|error| error.problem)
     }
 
@@ -267,6 +305,23 @@ mod tests {
         }
         let problem = read(&lanes(1.7)).unwrap_err().to_string();
         assert!(problem.contains("1.7 m apart") && problem.contains("`d_m`"), "{problem}");
+    }
+
+    #[test]
+    fn without_lanes_another_unit_is_in_doubt_by_the_vehicles_beside_each_other() {
+        let without = |width: f64| {
+            let lanes: Vec<(u8, f64)> = (0..5).map(|lane| (0, width * (f64::from(lane) + 0.5))).collect();
+            read_with(&lanes, LaneReliability::Unreliable).unwrap()
+        };
+        assert!(!without(3.6).is_in_doubt, "{:?}", without(3.6).notes);
+        for width in [3.6 / 0.3048, 150.0] {
+            let data = without(width);
+            assert!(
+                data.is_in_doubt && data.notes.iter().any(|note| note.contains("another unit")),
+                "{:?}",
+                data.notes
+            );
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ use super::markings::LaneMarkings;
 use super::ngsim;
 use super::order::{WINDOW_ROWS, order_of};
 use super::plausible;
-use super::side_by_side::SideBySide;
+use super::side_by_side::{self, SideBySide};
 use super::sides::Sides;
 use super::skipped_rows::SkippedRows;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
@@ -522,6 +522,11 @@ impl<'a> Tracks<'a> {
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         plausible::check(beginning, layout, clock)?;
         self.speed_doubt = plausible::doubt(beginning, clock);
+        if self.lanes == LaneReliability::Unreliable
+            && matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25)
+        {
+            self.speed_doubt = self.speed_doubt.take().or_else(|| side_by_side::doubt_of_unit(beginning));
+        }
         // Other readers derive the lanes from the positions, so that only an option can part them.
         let states_lanes =
             matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);

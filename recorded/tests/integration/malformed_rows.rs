@@ -163,9 +163,17 @@ fn a_number_of_two_vehicles_at_once_is_refused_by_that_reason_and_in_doubt_if_it
         }
         lines.join("\n") + "\n"
     };
-    let error = read_text(shared(1).as_bytes()).unwrap_err();
-    assert!(matches!(error.problem, TrajectoryFileProblem::SharedNumber { .. }), "{error}");
-    assert!(error.to_string().contains("belongs to several vehicles"), "{error}");
+    // The rows of the other vehicle at the end of the file, and by time.
+    let by_time = {
+        let mut lines: Vec<String> = shared(40).lines().map(str::to_owned).collect();
+        lines[1..].sort_by_key(|line| line.split(',').nth(3).unwrap().parse::<u32>().unwrap());
+        lines.join("\n") + "\n"
+    };
+    for text in [shared(1), by_time] {
+        let error = read_text(text.as_bytes()).unwrap_err();
+        assert!(matches!(error.problem, TrajectoryFileProblem::SharedNumber { .. }), "{error}");
+        assert!(error.to_string().contains("belongs to several vehicles"), "{error}");
+    }
     let options = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
     let text = shared(5);
     let tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), options, usize::MAX).unwrap();
