@@ -85,7 +85,8 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     protect(&inputs, &outputs)?;
     must_be_writable(args.output.as_deref())?;
     let wanted = Wanted { track: args.track, number: None, lead: Lead::Required };
-    let encounter = chosen(&args.file, &args.read, wanted)?;
+    let chosen = chosen_by(&args.file, &args.read, wanted, Ok)??;
+    let (code, encounter) = (chosen.code(), chosen.value);
     let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
     let file = scenario_of(&encounter, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
@@ -108,7 +109,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
         Format::Human => print_text(reenactment),
     }
-    Ok(ExitCode::Pass)
+    Ok(code)
 }
 
 /// Returns the message for a track without a lane change, or for a file without one. `track` holds whether the file has the
@@ -132,9 +133,18 @@ pub(super) fn lacks_lane_change(file: &str, track: Option<(u64, bool)>, others: 
     if track.is_some() && !others.is_empty() { CliError::usage(message) } else { CliError::NothingFound { message } }
 }
 
-/// Returns the encounter of the named track of a trajectory file, or the most critical one.
-pub(super) fn chosen(path: &Path, read: &ReadArgs, wanted: Wanted) -> Result<RecordedEncounter, CliError> {
-    chosen_by(path, read, wanted, Ok)?
+/// What is made of an encounter of a trajectory file.
+pub(super) struct Chosen<T> {
+    pub(super) value: T,
+    /// Whether a warning says why lane changes of the file may be wrong.
+    is_in_doubt: bool,
+}
+
+impl<T> Chosen<T> {
+    /// Returns the exit code.
+    pub(super) fn code(&self) -> ExitCode {
+        if self.is_in_doubt { ExitCode::Inconclusive } else { ExitCode::Pass }
+    }
 }
 
 /// Returns what `accept` makes of the encounter of the named track of a trajectory file, or of the
@@ -144,8 +154,11 @@ pub(super) fn chosen_by<T>(
     read: &ReadArgs,
     wanted: Wanted,
     accept: impl Fn(RecordedEncounter) -> Result<T, CliError>,
-) -> Result<Result<T, CliError>, CliError> {
-    let encounter = choose_first(&smooth(&read_noting(path, read.options())?), wanted, CONTROL_STEP, accept);
+) -> Result<Result<Chosen<T>, CliError>, CliError> {
+    let data = read_noting(path, read.options())?;
+    let is_in_doubt = data.is_in_doubt;
+    let accept = |encounter| accept(encounter).map(|value| Chosen { value, is_in_doubt });
+    let encounter = choose_first(&smooth(&data), wanted, CONTROL_STEP, accept);
     let track = wanted.track;
     let file = path.display();
     encounter.map_err(|error| match error {

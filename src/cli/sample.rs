@@ -96,7 +96,9 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         })?;
         Ok((source, zero))
     };
-    let (source, zero) = chosen_by(&args.file, &args.read, wanted, zero_of)??;
+    let chosen = chosen_by(&args.file, &args.read, wanted, zero_of)??;
+    let code = chosen.code();
+    let (source, zero) = chosen.value;
     let encounter = zero.encounter.clone();
     let inputs = (Path::new(&source), &args.set.settings[..]);
     let last_key = key.rsplit('.').next().unwrap_or_default();
@@ -147,7 +149,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", stamped(all.json(), Some(args.seed), None)),
         Format::Human => print_text(&all),
     }
-    Ok(ExitCode::Pass)
+    Ok(code)
 }
 
 /// Returns the error of a value that the parameter cannot have. The user has written no file that the
