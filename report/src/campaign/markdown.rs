@@ -10,7 +10,7 @@ use super::origins::Origins;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use super::recordings::card_beside;
 use super::text::{goals, imposed, not_prevented};
-use super::words::{Reasons, sentence};
+use super::words::{Reasons, p_text, sentence};
 use crate::escape::{in_markdown, markdown_code};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
@@ -143,8 +143,7 @@ fn arm_pairs(summary: &Summary) -> String {
             .to_owned();
     for (name, counts) in &summary.scenarios {
         for result in pair_results(summary, counts) {
-            let (pairs, p_value) =
-                (result.pairs, result.corrected_p.map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}")));
+            let (pairs, p_value) = (result.pairs, result.corrected_p.map_or_else(|| "-".to_owned(), p_text));
             text.push_str(&format!(
                 "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {p_value} |\n",
                 cell(name),
@@ -167,8 +166,9 @@ fn arm_pairs(summary: &Summary) -> String {
 
 fn pairs(counts: &Counts, inference: Inference) -> String {
     let pairs = &counts.pairs;
-    let p_value =
-        pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" McNemar mid-p of any collision {p:.1e}."));
+    let p_value = pairs
+        .mcnemar_p(inference)
+        .map_or_else(String::new, |p| format!(" McNemar mid-p of any collision {}.", p_text(p)));
     format!(
         "**{} prevented, {} induced**, {} in both arms, {} in neither.{p_value} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
         pairs.prevented,

@@ -13,7 +13,7 @@ use closecall_traffic::words::counted;
 
 use super::overview::{ErrorGroup, Overview};
 use super::pareto::ParetoText;
-use super::words::{Reasons, sentence};
+use super::words::{Reasons, p_text, sentence};
 
 /// Width of the names of the arms in the output, at least.
 const NAME_WIDTH: usize = 5;
@@ -114,7 +114,7 @@ fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts
         write!(f, "  pairs: {prevented} prevented, {induced} induced, {} both, {} neither", pairs.both, pairs.neither)?;
         if let Some(p) = pairs.mcnemar_p(summary.inference) {
             let [without, with] = [pairs.any_prevented, pairs.any_induced];
-            write!(f, "  (any vehicle: {without} to {with}, McNemar mid-p {p:.2e})")?;
+            write!(f, "  (any vehicle: {without} to {with}, McNemar mid-p {})", p_text(p))?;
         }
         writeln!(f)?;
         if let Some(sentence) = not_prevented(counts) {
@@ -216,7 +216,7 @@ fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Count
         write!(f, " {} prevented{},", pairs.prevented, interval(result.prevented_95))?;
         write!(f, " {} induced{},", pairs.induced, interval(result.induced_95))?;
         write!(f, " {} both, {} neither", pairs.both, pairs.neither)?;
-        writeln!(f, "{}", result.corrected_p.map_or_else(String::new, |p| format!(", p {p:.2e}")))?;
+        writeln!(f, "{}", result.corrected_p.map_or_else(String::new, |p| format!(", p {}", p_text(p))))?;
     }
     Ok(())
 }

@@ -307,6 +307,14 @@ impl Reasons {
     }
 }
 
+/// Smallest p value that is written without a power of ten.
+const LEAST_PLAIN_P: f64 = 0.001;
+
+/// Returns a p value: as a power of ten only if it is tiny.
+pub(crate) fn p_text(p: f64) -> String {
+    if p < LEAST_PLAIN_P { format!("{p:.2e}") } else { significant(p, DIGITS) }
+}
+
 #[cfg(test)]
 mod tests {
     use closecall_campaign::gate::OpenReason;
@@ -314,6 +322,12 @@ mod tests {
     use closecall_campaign::probability::ProbabilityGate;
 
     use super::*;
+
+    #[test]
+    fn a_p_value_is_a_plain_number_unless_it_is_tiny() {
+        let texts = [1.0, 0.625, 0.0421, 0.001, 8.31e-37].map(p_text);
+        assert_eq!(texts, ["1", "0.625", "0.0421", "0.001", "8.31e-37"]);
+    }
 
     fn gate(scenario: &str, text: &str, mark: Option<&str>, value: f64, answer: Answer) -> GateResult {
         GateResult {

@@ -5,6 +5,7 @@
 //! folded then.
 
 use super::super::text::{goals, imposed, not_prevented};
+use super::super::words::p_text;
 use std::cmp::Reverse;
 use std::io;
 
@@ -189,7 +190,7 @@ fn pairs(scenarios: &[(String, Counts)], inference: Inference) -> io::Result<Mar
                 (number(pairs.both))
                 (number(pairs.neither))
                 td.bar { (charts::balance(pairs.prevented, pairs.induced, most)?) }
-                (number(pairs.mcnemar_p(inference).map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}"))))
+                (number(pairs.mcnemar_p(inference).map_or_else(|| "-".to_owned(), p_text)))
                 (number(format!("{:.3}", pairs.prevented_harm)))
                 (number(format!("{:.3}", pairs.induced_harm)))
             }
@@ -220,7 +221,7 @@ fn arm_pairs(summary: &Summary) -> Markup {
     let interval = |interval: Option<[f64; 2]>| {
         interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", percent(low), percent(high)))
     };
-    let p_text = |p: Option<f64>| p.map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}"));
+    let p_or_dash = |p: Option<f64>| p.map_or_else(|| "-".to_owned(), p_text);
     let rows = html! {
         @for (name, counts) in &summary.scenarios {
             @for (index, result) in pair_results(summary, counts).iter().enumerate() {
@@ -234,8 +235,8 @@ fn arm_pairs(summary: &Summary) -> Markup {
                     (number(interval(result.induced_95)))
                     (number(result.pairs.both))
                     (number(result.pairs.neither))
-                    (number(p_text(result.mcnemar_p)))
-                    (number(p_text(result.corrected_p)))
+                    (number(p_or_dash(result.mcnemar_p)))
+                    (number(p_or_dash(result.corrected_p)))
                 }
             }
         }
