@@ -269,6 +269,29 @@ fn one_lane_number_for_all_vehicles_is_no_success_of_any_command() {
     }
 }
 
+/// The file states its positions in the lane and on the road only, which agree with each other.
+#[test]
+fn a_mirrored_recording_is_no_success_of_any_command_and_the_named_options_turn_it() {
+    let folder = folder();
+    let clean = recorded(folder.path());
+    let mirrored = changed(&clean, &folder.path().join("mirrored.csv"), |value| {
+        let unknown = ["heading_rel_rad", "x_m", "y_m"].map(|name| (name, 0.0));
+        unknown.into_iter().chain([("d_m", -value("d_m")), ("lane_id", 3.0 - value("lane_id"))]).collect()
+    });
+    let file = mirrored.to_str().unwrap();
+    let study = ["robustness", file, "--repetitions", "1"];
+    let others = ["lane-changes", "criticality", "fit", "statistics"].map(|command| [command, file]);
+    for words in others.iter().map(|words| &words[..]).chain([&study[..]]) {
+        let output = closecall(["traffic"].iter().chain(words));
+        assert_eq!(code(&output), INCONCLUSIVE, "{words:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("the positions are mirrored"), "{words:?}: {}", stderr(&output));
+    }
+    let output = closecall(["traffic", "lane-changes", file]);
+    assert!(stderr(&output).contains("`--mirror-d --lanes-from-right`"), "{}", stderr(&output));
+    let options = ["--mirror-d", "--lanes-from-right"];
+    assert_eq!(lane_changes(&mirrored, &options).0, lane_changes(&clean, &[]).0);
+}
+
 /// Writes three vehicles at 30 m/s. The first one moves to the left by 3.75 m within
 /// `duration_s`, if that is given.
 fn three_vehicles(to: &Path, duration_s: Option<f64>) -> PathBuf {
