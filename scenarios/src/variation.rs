@@ -3,13 +3,21 @@
 
 use closecall_controllers::{CheckedDriver, HumanDriver, Prescribed};
 use closecall_sensors::lidar::ClusteringCheck;
-use closecall_traffic::{Road, Time, VehicleState};
+use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Road, Time, VehicleState};
 
 use super::{Actor, Event, Scenario, Trigger};
 
-/// Distance within which the nearest vehicle behind starts that does not approach (m): a choice.
-/// Every rear sensor sees it, and it follows at 2 s at 30 m/s.
-const NEAR_M: f64 = 60.0;
+/// Distance within which the nearest vehicle behind starts that does not approach (m): the distance
+/// within which an approach counts.
+const NEAR_M: f64 = ENGAGEMENT_GAP_M;
+
+/// Largest speed with which the vehicles behind that do not approach come nearer (m/s): a quarter
+/// of the closing speed that counts as an approach, which is a choice. In a minute they pass
+/// through the distances at which a system may act.
+const DRIFT_MPS: f64 = 0.25 * ENGAGEMENT_CLOSING_MPS;
+
+/// Distance up to which the nearest of them does not come nearer at all (m): a choice.
+const KEPT_M: f64 = 20.0;
 
 impl Scenario {
     /// Returns the same scenario with half the step of the vehicle dynamics and the human drivers.
@@ -52,18 +60,21 @@ impl Scenario {
     }
 
     /// Returns the same scenario in which the vehicles that start behind the ego, in any lane, keep
-    /// their lane and a constant speed, at most the speed of the ego at the start. They start so
-    /// near that the ego can see one. The others have no events: somebody is behind, nobody
+    /// their lane and a constant speed. They come nearer, but so slowly that it is no approach. They
+    /// start so near that the ego can see one. The others have no events: somebody is behind, nobody
     /// approaches, and nothing happens ahead. Returns `None` if nobody is behind.
     pub fn with_nobody_approaching(&self) -> Option<Self> {
         let ego = self.actors[self.ego].start;
         let is_behind = |actor: &Actor| actor.start.s_m < ego.s_m;
         let behind_m = self.actors.iter().filter(|actor| is_behind(actor)).map(|actor| ego.s_m - actor.start.s_m);
-        let nearer_m = (behind_m.fold(f64::INFINITY, f64::min) - NEAR_M).max(0.0);
+        let nearest_m = behind_m.fold(f64::INFINITY, f64::min);
+        let nearer_m = (nearest_m - NEAR_M).max(0.0);
+        let room_m = (0.5 * (nearest_m.min(NEAR_M) - KEPT_M)).max(0.0);
+        let most_mps = ego.speed_mps + DRIFT_MPS.min(room_m / self.duration.s());
         let changed = |actor: &Actor| {
             let mut actor = Actor { events: Vec::new(), ..actor.clone() };
             if is_behind(&actor) {
-                let speed_mps = actor.start.speed_mps.min(ego.speed_mps);
+                let speed_mps = actor.start.speed_mps.min(most_mps);
                 actor.driver = CheckedDriver::Human(HumanDriver::Prescribed(Prescribed::constant(speed_mps)));
                 (actor.path, actor.speed_keeping) = (None, None);
                 let s_m = actor.start.s_m + nearer_m;
@@ -173,17 +184,24 @@ mod tests {
     }
 
     #[test]
-    fn with_nobody_approaching_the_vehicles_behind_are_no_faster_than_the_ego() {
+    fn with_nobody_approaching_the_vehicles_behind_come_nearer_too_slowly_to_count() {
         let scenario = headline();
         let kept = scenario.with_nobody_approaching().unwrap();
         let speeds_mps =
             |scenario: &Scenario| scenario.actors.iter().map(|actor| actor.start.speed_mps).collect::<Vec<_>>();
         let [before, after] = [&scenario, &kept].map(speeds_mps);
         assert!(before[2] > before[0] + 2.0);
-        assert_eq!(after, [before[0], before[1], before[0]]);
+        assert_eq!(after[..2], before[..2]);
+        let drift_mps = after[2] - after[0];
+        assert!((0.6..=0.7).contains(&drift_mps), "{drift_mps}");
         assert_eq!((kept.ego, kept.actors.len()), (scenario.ego, 3));
         let behind_m = |scenario: &Scenario| scenario.actors[0].start.s_m - scenario.actors[2].start.s_m;
         assert!(behind_m(&scenario) > 100.0 && (behind_m(&kept) - NEAR_M).abs() < 1e-9);
+        assert!((50.0..70.0).contains(&(behind_m(&kept) - drift_mps * kept.duration.s())));
+        let mut tailgated = scenario.clone();
+        tailgated.actors[2].start.s_m = tailgated.actors[0].start.s_m - 15.0;
+        let tailgated = tailgated.with_nobody_approaching().unwrap();
+        assert_eq!((behind_m(&tailgated), speeds_mps(&tailgated)[2]), (15.0, before[0]));
         assert!(kept.actors.iter().all(|actor| actor.events.is_empty()));
         assert_eq!(kept.actors[0].driver, scenario.actors[0].driver);
         assert_ne!(kept.actors[2].driver, scenario.actors[2].driver);
