@@ -42,7 +42,8 @@ pub fn harm(outcome: &Outcome) -> f64 {
             *worst = worse(*worst, delta_v_mps);
         }
     }
-    worst_mps.values().map(|&delta_v_mps| death_risk(delta_v_mps)).sum()
+    // The sum of an empty iterator is -0, which reports would show.
+    worst_mps.values().fold(0.0, |sum, &delta_v_mps| sum + death_risk(delta_v_mps))
 }
 
 #[cfg(test)]

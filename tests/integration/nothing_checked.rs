@@ -70,6 +70,8 @@ fn a_campaign_without_gates_and_checks_is_not_judged() {
     let enough = ["campaign", path.to_str().unwrap(), "-n", "20", "--max-collisions", "4"];
     assert!(stdout(&closecall(enough), 0).contains("PASS"));
     assert!(stdout(&run(&["--max-collisions", "4"]), 4).contains("too few samples"));
+    let harmless = stdout(&closecall(["campaign", enough[1], "-n", "20", "--gate", "min(harm) >= 0"]), 4);
+    assert!(harmless.contains("collisions of the sample: 0 (smallest of 20 samples"), "{harmless}");
 }
 
 #[test]

@@ -245,6 +245,9 @@ impl Expression {
         if matches!(quantity, Quantity::Compared(comparison) if comparison.is_constant()) {
             return true;
         }
+        if aggregate == Aggregate::Share && operator == Operator::AtLeast && self.condition == Some(quantity) {
+            return true;
+        }
         let least = || quantity.measure().and_then(|(measure, _)| measure.least());
         match (aggregate, operator) {
             // The allowed number may be fixed while the number of samples varies.
@@ -511,6 +514,10 @@ mod tests {
             "max(max_jerk_mps3) <= 1e300",
             "min(min_gap_rear_m) >= -1e300",
             "mean(harm) >= 0",
+            "min(time_lost_s) >= 0",
+            "max(max_deceleration_mps2) >= 0",
+            "count(imposed_braking_mps2 < 0) <= 0",
+            "share(rear_passed | rear_passed) >= 1",
             "sum(harm) >= -1",
             "p99(duration_s) >= 0",
             "count(harm < -1) <= 0",
@@ -529,6 +536,10 @@ mod tests {
             "min(min_gap_rear_m) >= 0",
             "p99(min_ttc_rear_s) >= 0",
             "mean(thw_gain_s) >= 0",
+            "min(crossing_braking_mps2) >= 0",
+            "count(rear_passed | rear_passed) >= 20",
+            "share(rear_passed | baseline.rear_passed) >= 1",
+            "share(ego_collided | ego_collided) <= 0.5",
             "sum(harm) <= 0.1",
             "mean(harm) <= 0",
             "count(harm > 0) <= 0",

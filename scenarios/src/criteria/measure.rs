@@ -78,7 +78,18 @@ const REPORTED: [&str; 4] = ["engaged", "goal_in_reach", "thw_gain_s", "emergenc
 pub(super) const LARGEST: f64 = 1e6;
 
 /// The numbers that are 0 or more by definition.
-const NOT_NEGATIVE: [&str; 4] = ["impact_speed_mps", "delta_v_mps", "harm", "duration_s"];
+const NOT_NEGATIVE: [&str; 10] = [
+    "impact_speed_mps",
+    "max_deceleration_mps2",
+    "max_jerk_mps3",
+    "max_speed_deficit_mps",
+    "unprompted_deficit_mps",
+    "time_lost_s",
+    "imposed_braking_mps2",
+    "delta_v_mps",
+    "harm",
+    "duration_s",
+];
 
 /// The flags of a pair of arms on the same sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
