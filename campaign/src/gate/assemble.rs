@@ -1,5 +1,5 @@
 //! Assembles the gates of a campaign: the gates of the command line, of a preset, and of the
-//! project file.
+//! project files.
 
 use closecall_scenarios::criteria::Expression;
 use closecall_scenarios::sampling::Design;
@@ -53,8 +53,8 @@ pub enum AssemblyError {
 }
 
 impl GateSet {
-    /// Adds the criteria of the command line, then of a preset, then of the project file. The
-    /// project file lies in the folder of this process or above it, if there is one.
+    /// Adds the criteria of the command line, then of a preset, then of the project files. They lie
+    /// in the folder of this process and above it.
     ///
     /// # Errors
     /// [`AssemblyError`] if a gate does not fit the campaign.
@@ -80,7 +80,7 @@ impl GateSet {
             self.push(GateSpec { expression, source: GateSource::Preset(name) });
         }
         let here = std::env::current_dir().ok();
-        if let Some(project) = here.map(|folder| ProjectFile::find(&folder)).transpose()?.flatten() {
+        for project in here.map(|folder| ProjectFile::find(&folder)).transpose()?.unwrap_or_default() {
             self.notes.extend(project.foreign_owner());
             project.add_to(self)?;
         }

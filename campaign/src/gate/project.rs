@@ -1,5 +1,8 @@
 //! The project file, `closecall.toml`: gates for every campaign that is run in a folder or below
 //! it.
+//!
+//! The files of all folders above count. A nearer file may demand more than one above it. If it
+//! demands less, it weakens that file as a gate of the command line does.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -39,18 +42,18 @@ pub struct ProjectFile {
 }
 
 impl ProjectFile {
-    /// Reads the project file of `folder`, or of the nearest folder above it. Returns `None` if
-    /// there is none.
+    /// Reads the project files of `folder` and of the folders above it, the nearest first.
     ///
     /// # Errors
-    /// [`ProjectError`] if the file cannot be read, has an unknown key or an invalid criterion, or
+    /// [`ProjectError`] if a file cannot be read, has an unknown key or an invalid criterion, or
     /// two criteria that contradict each other.
-    pub fn find(folder: &Path) -> Result<Option<Self>, ProjectError> {
+    pub fn find(folder: &Path) -> Result<Vec<Self>, ProjectError> {
+        let mut files = Vec::new();
         for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
             // A file that cannot be read may hold gates: they must not be left out. A link that
             // leads nowhere is one, for example into a submodule that is not checked out.
             match path.symlink_metadata() {
-                Ok(_) => return Self::read(&path).map(Some),
+                Ok(_) => files.push(Self::read(&path)?),
                 Err(error)
                     if !matches!(
                         error.kind(),
@@ -62,7 +65,7 @@ impl ProjectFile {
                 _ => (),
             }
         }
-        Ok(None)
+        Ok(files)
     }
 
     fn read(path: &Path) -> Result<Self, ProjectError> {
@@ -91,7 +94,8 @@ impl ProjectFile {
     }
 
     /// Adds the gates of the file that no gate of the set replaces. The set holds the gates of the
-    /// command line and of a preset. A preset replaces no gate of the file that demands more.
+    /// command line, of a preset and of nearer files. A preset replaces no gate of the file that
+    /// demands more.
     ///
     /// # Errors
     /// [`ProjectError`] if the largest probability or its confidence is out of range.
@@ -124,15 +128,48 @@ impl ProjectFile {
 mod tests {
     use super::*;
 
+    fn add_all(folder: &Path, set: &mut GateSet) {
+        ProjectFile::find(folder).unwrap().into_iter().for_each(|file| file.add_to(set).unwrap());
+    }
+
     #[test]
-    fn the_nearest_project_file_adds_what_the_set_does_not_have() {
+    fn a_nearer_project_file_hides_no_gate_of_one_above() {
+        let root = tempfile::tempdir().unwrap();
+        let below = root.path().join("a/b");
+        std::fs::create_dir_all(&below).unwrap();
+        let of_both = |nearer: &str| {
+            let above = "[gate]\nrequire = ['count(ego_collided) <= 3']\nmax-probability = 0.01\n";
+            std::fs::write(root.path().join(PROJECT_FILE), above).unwrap();
+            std::fs::write(below.join(PROJECT_FILE), nearer).unwrap();
+            let mut set = GateSet::default();
+            add_all(&below, &mut set);
+            let gates: Vec<String> = set.specs.iter().map(|spec| spec.expression.to_string()).collect();
+            (gates, set.probability.map(|spec| spec.gate.max()), set.weakened)
+        };
+        assert_eq!(of_both(""), (vec!["count(ego_collided) <= 3".to_owned()], Some(0.01), Vec::new()));
+        let stricter = of_both("[gate]\nrequire = ['count(ego_collided) <= 0']\nmax-probability = 0.001\n");
+        assert_eq!(stricter, (vec!["count(ego_collided) <= 0".to_owned()], Some(0.001), Vec::new()));
+        let (gates, max, weakened) = of_both("[gate]\nrequire = ['count(ego_collided) <= 9']\nmax-probability = 0.5\n");
+        assert_eq!((gates, max), (vec!["count(ego_collided) <= 9".to_owned()], Some(0.5)));
+        let nearer = below.join(PROJECT_FILE).display().to_string();
+        assert_eq!(
+            weakened,
+            [
+                format!("gate count(ego_collided) <= 3, replaced by count(ego_collided) <= 9 ({nearer})"),
+                format!("gate max-probability 0.01, replaced by 0.5 ({nearer})")
+            ]
+        );
+    }
+
+    #[test]
+    fn a_project_file_above_adds_what_the_set_does_not_have() {
         let root = tempfile::tempdir().unwrap();
         let below = root.path().join("a/b");
         std::fs::create_dir_all(&below).unwrap();
         let text = "[gate]\nrequire = ['count(ego_collided) <= 0', 'max(max_jerk_mps3) <= 3']\n";
         std::fs::write(root.path().join(PROJECT_FILE), text).unwrap();
         let mut set = GateSet::of(["count(ego_collided) <= 5".parse().unwrap()]);
-        ProjectFile::find(&below).unwrap().unwrap().add_to(&mut set).unwrap();
+        add_all(&below, &mut set);
         let gates: Vec<String> = set.specs.iter().map(|spec| spec.expression.to_string()).collect();
         assert_eq!(gates, ["count(ego_collided) <= 5", "max(max_jerk_mps3) <= 3"]);
     }
@@ -144,7 +181,7 @@ mod tests {
         write("[gate]\nrequire = ['share(engaged) >= 0.1', 'share(engaged) <= 0.5']\n");
         let gates_beside = |command_line: &str| {
             let mut set = GateSet::of([command_line.parse().unwrap()]);
-            ProjectFile::find(root.path()).unwrap().unwrap().add_to(&mut set).unwrap();
+            add_all(root.path(), &mut set);
             set.specs.iter().map(|spec| spec.expression.to_string()).collect::<Vec<_>>()
         };
         let range = ["share(engaged) >= 0.1", "share(engaged) <= 0.5"];
@@ -165,7 +202,7 @@ mod tests {
             let mut set = GateSet::of([gate.parse().unwrap()]);
             let gate = max_probability.map(|max| ProbabilityGate::new(max, ProbabilityGate::CONFIDENCE).unwrap());
             set.probability = gate.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
-            ProjectFile::find(root.path()).unwrap().unwrap().add_to(&mut set).unwrap();
+            add_all(root.path(), &mut set);
             set.weakened
         };
         assert_eq!(

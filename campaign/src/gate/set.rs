@@ -144,8 +144,16 @@ impl GateSet {
     pub(super) fn weaker_than_probability(&self, gate: &ProbabilityGate) -> Option<String> {
         let spec = self.probability.as_ref()?;
         let is_kept = spec.gate.max() <= gate.max() && spec.gate.confidence() >= gate.confidence();
-        (!is_kept)
-            .then(|| format!("gate max-probability {}, replaced by {} ({})", gate.max(), spec.gate.max(), spec.source))
+        let words = |of: &ProbabilityGate| {
+            if spec.gate.confidence() < gate.confidence() {
+                format!("{} with confidence {}", of.max(), of.confidence())
+            } else {
+                of.max().to_string()
+            }
+        };
+        (!is_kept).then(|| {
+            format!("gate max-probability {}, replaced by {} ({})", words(gate), words(&spec.gate), spec.source)
+        })
     }
 
     /// Returns what the gates of the set demand less than the gates that they replace: the gates of
@@ -230,7 +238,11 @@ mod tests {
             GateSet { probability, ..GateSet::default() }.weakened_in(&gated())
         };
         assert_eq!(bounded(0.5, 0.95), ["gate max-probability 0.01, replaced by 0.5 (command line)"]);
-        assert_eq!(bounded(0.01, 0.6).len(), 1, "less confidence is less");
+        assert_eq!(
+            bounded(0.01, 0.6),
+            ["gate max-probability 0.01 with confidence 0.95, replaced by 0.01 with confidence 0.6 (command line)"],
+            "less confidence is less"
+        );
         assert!(bounded(0.001, 0.99).is_empty());
         let gates = GateSet::of(["count(ego_collided) <= 39".parse().unwrap()]);
         let measurement = GateSet { is_measurement: true, ..gates };
