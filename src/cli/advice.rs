@@ -136,6 +136,13 @@ pub(super) fn known_seed(judges: bool, manifest: &Manifest, can_draw: bool) -> O
         .then(|| format!("the seed was known before the run: a controller could recognise its samples{remedy}"))
 }
 
+/// Returns the remark of a verdict on a part of a campaign: its samples are not all. `None` for a
+/// whole campaign, and for one that does not judge.
+pub(super) fn part_only(judges: bool, manifest: &Manifest) -> Option<String> {
+    let part = manifest.partition.filter(|_| judges)?;
+    Some(format!("this is the verdict on part {part} alone: `closecall tool merge` judges the samples of all parts"))
+}
+
 /// Returns the option that gives the missing input of a net effect.
 pub(super) const fn to_provide(missing: Missing) -> &'static str {
     match missing {

@@ -41,7 +41,7 @@ use serde_json::Value;
 
 use super::CliError;
 use super::actions::command_for;
-use super::advice::{after_verdict, known_seed};
+use super::advice::{after_verdict, known_seed, part_only};
 use super::args::{FittedArgs, Format, SensorsChoice, SetArgs};
 use super::argument::Argument;
 use super::arms::{ComparisonArgs, ControllerArgs, tuned};
@@ -689,9 +689,9 @@ pub(super) fn carry_out(
     let tally = &progress.tally;
     let mut judged = tally.judgement();
     judged.add_invalid(watch.finish());
-    if let Some(remark) = known_seed(judged.has_gates(), &manifest, planned.can_draw_seed) {
-        judged.add_remark(remark);
-    }
+    let remarks =
+        [known_seed(judged.has_gates(), &manifest, planned.can_draw_seed), part_only(judged.has_gates(), &manifest)];
+    remarks.into_iter().flatten().for_each(|remark| judged.add_remark(remark));
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
     tell(&Conclusion::Judged(Judged {
         report: &report,
