@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::whole;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
-use closecall_report::exchange::{Case, Form, Motion, write_case};
+use closecall_report::exchange::{Case, CaseFiles, Form, Motion, write_case};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{RunKey, Scenario, ScenarioFile};
 use closecall_simulation::Arm;
@@ -120,6 +120,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     }
     let (controller, motion) = (arm.controller.name(), &motion);
     let files = Case { file, scenario, key: *key, controller, motion, value_sets }.files(&forms);
+    must_leave_nothing(&files, &args.output)?;
     write_case(&args.output, &files)?;
     files.files.iter().for_each(|(name, _)| print_written(&args.output.join(name)));
     for (form, unsaid) in &files.unsaid {
@@ -127,6 +128,18 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
         unsaid.iter().for_each(|statement| textln!("  {statement}"));
     }
     Ok(ExitCode::Pass)
+}
+
+/// Returns an error if the folder has a file of an earlier case that would remain: it would be taken
+/// for a file of this case.
+fn must_leave_nothing(files: &CaseFiles, folder: &Path) -> Result<(), CliError> {
+    match files.left_in(folder).first() {
+        None => Ok(()),
+        Some(left) => Err(CliError::usage(format!(
+            "{} is of an earlier export, and would stay beside the new files: remove it, or name another folder",
+            left.display()
+        ))),
+    }
 }
 
 fn of_file(args: &ExportArgs) -> Result<Chosen, CliError> {

@@ -178,6 +178,20 @@ fn a_scenario_without_parameters_has_no_values_and_no_distributions() {
 }
 
 #[test]
+fn a_folder_with_a_form_that_an_export_does_not_renew_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "paper-figure --sensors ground-truth --form";
+    let both = exported(&format!("{words} open-loop,closed-loop"), folder.path());
+    for form in ["closed-loop", "commonroad"] {
+        let output = run(&format!("tool export {words} {form} -o"), folder.path());
+        assert_eq!(code(&output), 2, "{form}: {}", message(&output));
+        assert!(message(&output).contains("open-loop.xosc is of an earlier export"), "{}", message(&output));
+    }
+    let again = exported(&format!("{words} open-loop,closed-loop"), folder.path());
+    assert_eq!(again, both, "the same forms may be written again");
+}
+
+#[test]
 fn options_that_belong_to_the_other_kind_of_source_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("case");

@@ -31,6 +31,8 @@ pub enum Form {
 impl Form {
     /// The forms of OpenSCENARIO.
     pub const OPENSCENARIO: [Self; 3] = [Self::OpenLoop, Self::ClosedLoop, Self::Logical];
+    /// All forms.
+    pub const ALL: [Self; 4] = [Self::OpenLoop, Self::ClosedLoop, Self::Logical, Self::CommonRoad];
 
     /// Returns the name of the form.
     pub const fn name(self) -> &'static str {
@@ -82,6 +84,15 @@ pub struct CaseFiles {
     pub files: Vec<(PathBuf, String)>,
     /// The properties that each form cannot express.
     pub unsaid: Vec<(Form, Vec<String>)>,
+}
+
+impl CaseFiles {
+    /// Returns the files of a case in the folder that these files would not replace.
+    pub fn left_in(&self, folder: &Path) -> Vec<PathBuf> {
+        let names = Form::ALL.into_iter().flat_map(Form::files).map(Path::new);
+        let others = names.filter(|name| self.files.iter().all(|(written, _)| written != name));
+        others.map(|name| folder.join(name)).filter(|path| path.exists()).collect()
+    }
 }
 
 impl Case<'_> {
