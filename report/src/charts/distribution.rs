@@ -34,12 +34,7 @@ pub(crate) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::Result<Marku
         let width = kind.high / BINS as f64;
         for (index, bins) in arms.iter().enumerate() {
             let colour = arm_colour(index + 1 == arms.len());
-            let steps: Vec<(f64, f64)> = bins
-                .counts
-                .iter()
-                .enumerate()
-                .flat_map(|(bin, &count)| [bin as f64, bin as f64 + 1.0].map(|edge| (edge * width, count as f64)))
-                .collect();
+            let steps = steps(&bins.counts, width);
             plot.draw_series(AreaSeries::new(steps.iter().copied(), 0.0, colour.mix(AREA_OPACITY)))?;
             plot.draw_series(LineSeries::new(steps, colour.stroke_width(2)))?;
         }
@@ -52,6 +47,19 @@ pub(crate) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::Result<Marku
         }
         Ok(())
     })
+}
+
+/// Returns the corners of the steps of a distribution, whose bins have this width. Bins of equal
+/// counts form one step: most bins of a small campaign are empty.
+fn steps(counts: &[u64], width: f64) -> Vec<(f64, f64)> {
+    let mut corners = Vec::new();
+    let mut left = 0;
+    for step in counts.chunk_by(PartialEq::eq) {
+        let right = left + step.len();
+        corners.extend([left, right].map(|edge| (edge as f64 * width, step[0] as f64)));
+        left = right;
+    }
+    corners
 }
 
 /// Draws how many samples lie in each part of a parameter's range, by their fate.
@@ -105,4 +113,19 @@ fn label_near(labels: &[String], position: f64) -> String {
     let is_near = (position - nearest).abs() < 0.25 && nearest >= 0.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
     is_near.then(|| labels.get(nearest as usize).cloned()).flatten().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_of_equal_counts_form_one_step() {
+        assert_eq!(
+            steps(&[0, 0, 3, 3, 3, 1], 0.5),
+            [(0.0, 0.0), (1.0, 0.0), (1.0, 3.0), (2.5, 3.0), (2.5, 1.0), (3.0, 1.0)]
+        );
+        assert_eq!(steps(&[2; 40], 1.0), [(0.0, 2.0), (40.0, 2.0)]);
+        assert!(steps(&[], 1.0).is_empty());
+    }
 }

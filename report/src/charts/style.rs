@@ -214,6 +214,9 @@ pub(super) fn scaled(
     sized(size_px, &format!("style=\"max-width:{widest_px}px\""), paint)
 }
 
+/// Attributes that plotters writes although they are the defaults of SVG.
+const DEFAULTS: [&str; 3] = [" opacity=\"1\"", " stroke-width=\"1\"", " stroke=\"none\""];
+
 /// Returns a chart with other attributes in the place of its width and height.
 pub(super) fn sized(
     size_px: (u32, u32),
@@ -222,7 +225,14 @@ pub(super) fn sized(
 ) -> io::Result<Markup> {
     let text = svg(size_px, paint).map_err(|error| io::Error::other(error.to_string()))?;
     let written_size = format!("width=\"{}\" height=\"{}\"", size_px.0, size_px.1);
-    Ok(PreEscaped(text.replacen(&written_size, attributes, 1)))
+    let inherited = [format!(" font-family=\"{FONT}\""), format!(" fill=\"{}\"", css(AXIS).to_uppercase())];
+    let with_inherited = format!("{attributes}{}", inherited.concat());
+    // A report has thousands of charts: the chart as a whole has the font and the colour of its
+    // text, and no shape repeats a default.
+    let repeated = inherited.iter().map(String::as_str).chain(DEFAULTS);
+    let lean = repeated.fold(text, |text, repeated| text.replace(repeated, ""));
+    let lean = lean.replace(">\n", ">").replace("\n<", "<");
+    Ok(PreEscaped(lean.replacen(&written_size, &with_inherited, 1)))
 }
 
 #[cfg(test)]
@@ -291,12 +301,31 @@ mod tests {
     }
 
     #[test]
+    fn a_chart_on_a_page_states_its_font_once_and_no_default_of_svg() {
+        let paint = |canvas: &Canvas<'_>| {
+            canvas.draw(&Text::new("left", (5, 5), label_text(true)))?;
+            canvas.draw(&Text::new("a < b", (5, 20), label_text(true)))?;
+            canvas.draw(&Circle::new((5, 5), 2, BLACK.mix(0.5)))
+        };
+        let chart = inline(SMALL_PX, paint).unwrap().into_string();
+        assert_eq!([chart.matches("DejaVu").count(), chart.matches("#555F6B").count()], [1, 1], "{chart}");
+        assert!(
+            DEFAULTS.iter().all(|default| !chart.contains(default)) && chart.contains("opacity=\"0.5\""),
+            "{chart}"
+        );
+        assert!(chart.contains(">left</text>") && chart.contains(">a &lt; b</text>"), "{chart}");
+    }
+
+    #[test]
     fn a_chart_on_a_page_shrinks_with_the_page() {
         let chart = inline(SMALL_PX, |canvas| canvas.draw(&Circle::new((5, 5), 2, BLACK))).unwrap().into_string();
-        assert!(chart.starts_with("<svg style=\"max-width:420px\" viewBox=\"0 0 420 220\""), "{chart}");
+        let head = "<svg style=\"max-width:420px\" font-family=\"DejaVu Sans, sans-serif\" fill=\"#555F6B\" viewBox=\"0 0 420 220\"";
+        assert!(chart.starts_with(head), "{chart}");
         let paint = |canvas: &Canvas<'_>| canvas.draw(&Circle::new((5, 5), 2, BLACK));
         let map = scaled(MAP_PX, WIDEST_MAP_PX, paint).unwrap().into_string();
-        assert!(map.starts_with("<svg style=\"max-width:620px\" viewBox=\"0 0 400 360\""), "{map}");
+        assert!(
+            map.starts_with("<svg style=\"max-width:620px\" font-family=") && map.contains("viewBox=\"0 0 400 360\"")
+        );
         // The frame of a page of 390 px is 360 px wide, and letters are smaller than their font
         // size (see `LABEL_PX`).
         assert!(f64::from(LABEL_PX) / 1.24 * 360.0 / f64::from(MAP_PX.0) > 9.0);
