@@ -832,7 +832,7 @@ fn malformed_parquet_is_refused() {
     assert_mentions(&error(&good[..good.len() / 2]), &["Parquet file"], "cut");
     assert_mentions(&error(&parquet_of(&plain_columns(40, -30.0))), &["line 2", "`speed_mps`", "0 to 150"], "negative");
     assert_mentions(&error(&parquet_of(&plain_columns(40, f64::NAN))), &["line 2", "`speed_mps`", "NaN"], "NaN");
-    assert_mentions(&error(&parquet_of(&[Column::Whole("a", vec![1])])), &["1 columns", "starts with `a`"], "other");
+    assert_mentions(&error(&parquet_of(&[Column::Whole("a", vec![1])])), &["1 column and", "starts with `a`"], "other");
     // In the metadata of a column, the number of its codec follows its name. In Thrift's compact
     // protocol, 8 is the number 4: Brotli.
     let (codec, of_column) = ([0x15, 0x08, 0x16], b"d_m\x15\x00\x16");
