@@ -164,7 +164,13 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
     let expected = BTreeMap::from([
         (Fault::Panics, ("panic", "a panic: index 7 of 3")),
         (Fault::SleepsForever, ("timeout", "no outcome within 5 s of wall time")),
-        (Fault::AnswersNan, ("command", "the ego controller asked for an acceleration of NaN m/s² at 2.00 s")),
+        (
+            Fault::AnswersNan,
+            (
+                "command",
+                "the ego controller asked for an acceleration of NaN m/s² at 2.00 s: it must be a number from -100 to 100",
+            ),
+        ),
     ]);
     let mut failed_by_fault: Vec<Vec<u64>> = Vec::new();
     for (fault, (kind, message)) in expected {

@@ -91,15 +91,20 @@ impl Tail {
 }
 
 /// Returns a line without the number by which the system knows a thread, which differs from run to
-/// run. Rust writes `thread 'main' (4711) has overflowed its stack`.
+/// run. Rust writes `thread 'main' (4711) has overflowed its stack`, Python
+/// `Current thread 0x00007f3a5c6b7740 (most recent call first):`.
 fn without_thread_number(line: &str) -> String {
-    let numbered = line.strip_prefix("thread '").and_then(|rest| rest.split_once("' ("));
-    let named = numbered.and_then(|(name, rest)| {
+    let of_rust = || {
+        let (name, rest) = line.strip_prefix("thread '")?.split_once("' (")?;
         let (number, after) = rest.split_once(')')?;
         let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
         is_number.then(|| format!("thread '{name}'{after}"))
-    });
-    named.unwrap_or_else(|| line.to_owned())
+    };
+    let of_python = || {
+        let (name, after) = line.split_once(" 0x").filter(|(name, _)| matches!(*name, "Thread" | "Current thread"))?;
+        Some(format!("{name}{}", after.trim_start_matches(|c: char| c.is_ascii_hexdigit())))
+    };
+    of_rust().or_else(of_python).unwrap_or_else(|| line.to_owned())
 }
 
 /// Returns the beginning of a line, for an error message.
@@ -171,6 +176,13 @@ mod tests {
         assert_eq!(
             tail.last_lines(),
             "thread 'main' has overflowed its stack | fatal runtime error: stack overflow, aborting | thread 'a (b)' (x) is late"
+        );
+        tail.push(b"\x1eFatal Python error: Segmentation fault\n\nCurrent thread 0x00007f3a5c6b7740 (most recent call first):\n");
+        tail.push(b"Thread 0x1f [worker] (most recent call first):\nthe thread 0x1f is late\n");
+        assert_eq!(
+            tail.last_lines(),
+            "Fatal Python error: Segmentation fault | Current thread (most recent call first): | Thread [worker] (most recent call \
+             first): | the thread 0x1f is late"
         );
     }
 }
