@@ -19,7 +19,6 @@ use closecall_traffic::{
 };
 
 use super::{Film, FilmActor, Frame, Level, Part};
-use crate::units::labelled;
 use closecall_scenarios::causal::VehicleLetters;
 use closecall_sensors::SensorAlarms;
 use closecall_simulation::{CurrentMargins, Lead};
@@ -347,25 +346,24 @@ fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
     for (name, metric) in change.metrics.named() {
         if let MetricResult::Value { value, opponent, time_s, critical } = metric {
             let against = opponent.map_or(String::new(), |track| format!(" to track {track}"));
-            let (label, limit) = described(name);
+            let (label, unit, limit) = described(name);
             let mark = if critical { "CRITICAL" } else { "not critical" };
-            notes.push((Time::from_s(time_s), format!("{label} {value:.2}{against}: {mark} ({limit})")));
+            notes.push((Time::from_s(time_s), format!("{label} {value:.2} {unit}{against}: {mark} ({limit})")));
         }
     }
     notes
 }
 
-/// Returns the label of a metric with its unit, and its threshold.
-fn described(name: &str) -> (String, String) {
-    let label = labelled(name);
-    let limit = match name {
-        "distance_m" => format!("threshold {CRITICAL_DISTANCE_M} m"),
-        "speed_mps" => format!("threshold {CRITICAL_SPEED_FACTOR} of the speed limit"),
-        "a_lon_mps2" => format!("threshold {CRITICAL_A_LON_MPS2} m/s²"),
-        "a_lat_mps2" => format!("threshold {CRITICAL_A_LAT_MPS2} m/s²"),
-        "thw_s" => format!("threshold {CRITICAL_THW_S} s"),
-        "dce_m" => format!("threshold {CRITICAL_DCE_M} m"),
-        _ => format!("threshold {CRITICAL_TTCE_S} s"),
-    };
-    (label, limit)
+/// Returns the name of a metric in words, its unit, and its threshold.
+fn described(name: &str) -> (&'static str, &'static str, String) {
+    let at = |threshold: f64, unit: &str| format!("threshold {threshold} {unit}");
+    match name {
+        "distance_m" => ("distance", "m", at(CRITICAL_DISTANCE_M, "m")),
+        "speed_mps" => ("speed", "m/s", at(CRITICAL_SPEED_FACTOR, "of the speed limit")),
+        "a_lon_mps2" => ("longitudinal acceleration", "m/s²", at(CRITICAL_A_LON_MPS2, "m/s²")),
+        "a_lat_mps2" => ("lateral acceleration", "m/s²", at(CRITICAL_A_LAT_MPS2, "m/s²")),
+        "thw_s" => ("time headway", "s", at(CRITICAL_THW_S, "s")),
+        "dce_m" => ("distance at closest encounter", "m", at(CRITICAL_DCE_M, "m")),
+        _ => ("time to closest encounter", "s", at(CRITICAL_TTCE_S, "s")),
+    }
 }

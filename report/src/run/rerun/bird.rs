@@ -28,11 +28,15 @@ use closecall_scenarios::outcome::{CRITICAL_THW_S, Collision};
 
 /// Factor by which the picture is stretched across the road.
 const STRETCH: f64 = 1.0;
+/// Height that a label needs above or below a road (px).
+const LABEL_ROOM_PX: f64 = 15.0;
 /// Rear and front end of the road in the picture, relative to the ego (m).
 pub(super) const X_RANGE_M: [f64; 2] = [-35.0, 75.0];
 /// A line shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.5;
-/// Room for the clock and the names above the road (m in the picture).
+/// Room for the clock and the names above a road of three lanes (m in the picture). Wider roads
+/// make the drawing smaller, and its labels not: all rooms and distances of labels grow by
+/// [`Canvas::label_scale`].
 const ABOVE_M: f64 = 4.8;
 /// Room for the names below the road (m in the picture).
 const BELOW_M: f64 = 4.6;
@@ -47,8 +51,10 @@ const NAMES_BELOW_M: f64 = 0.3;
 const AXIS_BELOW_M: f64 = 5.2;
 /// Distance between two marks of the axis (m).
 const AXIS_STEP_M: i32 = 10;
-/// Marks of the axis that have a number are this many steps apart.
+/// Marks of the axis that have a number are at least this many steps apart.
 const AXIS_NUMBERED: i32 = 2;
+/// Letters of the longest number on the axis: `-20 m`.
+const NUMBER_LETTERS: usize = 5;
 /// Width of the view in a window of 1280 x 720 px (px).
 const VIEW_WIDTH_PX: f64 = 700.0;
 /// Its least and its largest height, by layout, with one road and with two (px).
@@ -80,6 +86,8 @@ pub(super) struct Canvas<'a> {
     ends_early: bool,
     /// Least and largest number of pixels of a metre in a window of 1280 x 720 px.
     px_per_m: [f64; 2],
+    /// Factor of the rooms and distances of labels.
+    label_scale: f64,
 }
 
 impl<'a> Canvas<'a> {
@@ -87,17 +95,20 @@ impl<'a> Canvas<'a> {
     pub(super) fn of_films(films: &'a [Film]) -> Vec<Self> {
         let mut top_m = 0.0;
         let end = Film::span(films)[1];
+        let heights_px = VIEW_HEIGHTS_PX[usize::from(films.len() > 1)];
+        let roads_m: Vec<f64> = films.iter().map(|film| -film.road.right_edge_m() * STRETCH).collect();
+        let label_scale = label_scale(&roads_m, heights_px[0]);
         let mut canvases = Vec::new();
         for (index, film) in films.iter().enumerate() {
             let (has_axis, ends_early) = (index + 1 == films.len(), film.end() < end);
-            canvases.push(Self { film, top_m, has_axis, ends_early, px_per_m: [1.0; 2] });
-            top_m += ABOVE_M + BELOW_M - film.road.right_edge_m() * STRETCH;
+            canvases.push(Self { film, top_m, has_axis, ends_early, px_per_m: [1.0; 2], label_scale });
+            top_m += label_scale * (ABOVE_M + BELOW_M) - film.road.right_edge_m() * STRETCH;
         }
         // The viewer fits the drawing into the view: wide roads make it smaller, and its labels
         // not.
-        let heights_px = VIEW_HEIGHTS_PX[usize::from(films.len() > 1)];
-        let px_per_m = heights_px
-            .map(|height_px| (VIEW_WIDTH_PX / (X_RANGE_M[1] - X_RANGE_M[0])).min(height_px / (top_m + AXIS_M)));
+        let whole_m = top_m + label_scale * AXIS_M;
+        let px_per_m =
+            heights_px.map(|height_px| (VIEW_WIDTH_PX / (X_RANGE_M[1] - X_RANGE_M[0])).min(height_px / whole_m));
         for canvas in &mut canvases {
             canvas.px_per_m = px_per_m;
         }
@@ -118,7 +129,18 @@ impl<'a> Canvas<'a> {
 
     /// Returns the upper and the lower end of the drawing (m in the picture).
     pub(super) fn range_m(&self) -> [f64; 2] {
-        [self.top_m - ABOVE_M, self.bottom_m() + BELOW_M + if self.has_axis { AXIS_M } else { 0.0 }]
+        let below_m = BELOW_M + if self.has_axis { AXIS_M } else { 0.0 };
+        [self.top_m - self.label_scale * ABOVE_M, self.bottom_m() + self.label_scale * below_m]
+    }
+
+    /// Returns the height of the clock and of the names above the road (m in the picture).
+    fn above_m(&self) -> f64 {
+        self.top_m - self.label_scale * NAMES_ABOVE_M
+    }
+
+    /// Returns the height of the names below the road (m in the picture).
+    fn below_m(&self) -> f64 {
+        self.bottom_m() + self.label_scale * NAMES_BELOW_M
     }
 
     /// Returns the position of the right edge of the road across the picture (m in the picture).
@@ -130,6 +152,14 @@ impl<'a> Canvas<'a> {
     pub(super) fn at(&self, frame: &Frame, s_m: f64, d_m: f64) -> [f32; 2] {
         [(s_m - frame.states[self.film.ego].s_m) as f32, (self.top_m - d_m * STRETCH) as f32]
     }
+}
+
+/// Returns the factor, at least 1, of the rooms for labels beside roads of these widths (m): in a
+/// view of this height (px), each label above a road then has the pixels that it needs.
+fn label_scale(roads_m: &[f64], height_px: f64) -> f64 {
+    let labels_m = roads_m.len() as f64 * (ABOVE_M + BELOW_M) + AXIS_M;
+    let whole_m: f64 = roads_m.iter().sum();
+    (LABEL_ROOM_PX * whole_m / (ABOVE_M * height_px - LABEL_ROOM_PX * labels_m)).max(1.0)
 }
 
 pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
@@ -155,9 +185,10 @@ fn write_lanes(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Recording
         0 => 0.0,
         line => road.lane_centre_m(Lane(line)) - 0.5 * road.lane_width_m(),
     });
+    // A drawing of wide roads shows more than the stretch that is meant.
     let strips = lines.map(|d_m| {
         let y = (canvas.top_m - d_m * STRETCH) as f32;
-        X_RANGE_M.map(|x_m| [4.0 * x_m as f32, y])
+        X_RANGE_M.map(|x_m| [8.0 * x_m as f32, y])
     });
     let edge = |line: u8| line == 0 || line == road.lanes();
     let colours = (0..=road.lanes()).map(|line| if edge(line) { palette::MARKING } else { palette::QUIET });
@@ -167,7 +198,7 @@ fn write_lanes(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Recording
 
 /// Writes the metre axis below the road.
 fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
-    let y = (canvas.bottom_m() + AXIS_BELOW_M) as f32;
+    let y = (canvas.bottom_m() + canvas.label_scale * AXIS_BELOW_M) as f32;
     let [first, last] = X_RANGE_M.map(|x_m| (x_m as i32) / AXIS_STEP_M);
     let marks: Vec<i32> = (first..=last).collect();
     let x = |mark: i32| (mark * AXIS_STEP_M) as f32;
@@ -178,7 +209,8 @@ fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingE
         .with_radii([0.09_f32])
         .with_draw_order(LANE_ORDER);
     writer.write_static("bird/axis", &lines)?;
-    let numbered: Vec<i32> = marks.into_iter().filter(|mark| mark % AXIS_NUMBERED == 0).collect();
+    let apart = (canvas.label_m(NUMBER_LETTERS) / f64::from(AXIS_STEP_M)).ceil() as i32;
+    let numbered: Vec<i32> = marks.into_iter().filter(|mark| mark % apart.max(AXIS_NUMBERED) == 0).collect();
     let numbers = Points2D::new(numbered.iter().map(|&mark| [x(mark), y]))
         .with_labels(numbered.iter().map(|mark| format!("{} m", mark * AXIS_STEP_M)))
         .with_colors([palette::LABEL])
@@ -216,7 +248,7 @@ pub(super) fn clock_text(canvas: &Canvas<'_>, time: Time) -> String {
 
 /// Writes the name of the arm with the time of the frame. A label is centred at its point.
 fn write_clock(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
-    let at = [(canvas.labelled_m()[0] + 0.5 * clock_m(canvas)) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
+    let at = [(canvas.labelled_m()[0] + 0.5 * clock_m(canvas)) as f32, canvas.above_m() as f32];
     let entity = "bird/clock";
     let fixed = Points2D::new([at]).with_colors([palette::LABEL]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(entity, &fixed)?;
@@ -398,7 +430,7 @@ fn write_collisions(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
     let entity = "bird/collision";
     let text = collision_mark(film, collision);
     let half_m = 0.5 * canvas.label_m(text.chars().count());
-    let text_at = [(canvas.labelled_m()[1] - half_m) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
+    let text_at = [(canvas.labelled_m()[1] - half_m) as f32, canvas.above_m() as f32];
     let fixed = Points2D::update_fields()
         .with_colors([palette::CRITICAL, palette::LABEL])
         .with_radii([1.6_f32, 0.05])
@@ -415,4 +447,22 @@ fn write_collisions(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
         });
         Points2D::update_fields().with_positions(marks).columns(vec![2; frames.len()])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_beside_wide_roads_have_the_room_of_labels_beside_narrow_ones() {
+        let [lanes_3_m, lanes_6_m] = [3.0 * 3.75, 6.0 * 3.66];
+        let [one_px, two_px] = VIEW_HEIGHTS_PX.map(|[least_px, _]| least_px);
+        assert_eq!([label_scale(&[lanes_3_m], one_px), label_scale(&[lanes_3_m; 2], two_px)], [1.0; 2]);
+        for (roads_m, height_px) in [(&[lanes_6_m][..], one_px), (&[lanes_6_m; 2][..], two_px)] {
+            let scale = label_scale(roads_m, height_px);
+            let labels_m = scale * (roads_m.len() as f64 * (ABOVE_M + BELOW_M) + AXIS_M);
+            let room_px = scale * ABOVE_M * height_px / (roads_m.iter().sum::<f64>() + labels_m);
+            assert!(scale > 1.2 && (room_px - LABEL_ROOM_PX).abs() < 1e-9, "{scale}: {room_px} px");
+        }
+    }
 }

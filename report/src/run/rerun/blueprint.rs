@@ -94,13 +94,21 @@ pub(super) fn write(recording: &Recording, films: &[FilmContents], verdict_text:
     nodes::write(recording, root.unwrap_or_else(verdict), OPENING_TIMELINE)
 }
 
+/// Height of the view from above of a pair on a road of three lanes (m in the picture), and the
+/// most by which the view of wider roads is higher.
+const PAIR_M: f64 = 47.7;
+const MOST_HIGHER: f64 = 1.6;
+
 /// Returns the room for the view from above: recorded roads have more lanes.
 fn bird_share(films: &[FilmContents]) -> f32 {
+    let ends = films.iter().flat_map(|film| film.bird_range);
+    let [low, high] = ends.fold([0.0_f64; 2], |[low, high], end| [low.min(end), high.max(end)]);
+    let higher = ((high - low) / PAIR_M).clamp(1.0, MOST_HIGHER) as f32;
     match films {
         [_] if is_traffic(films) => 3.4,
         [_] => 3.0,
-        _ if films.iter().any(|film| film.camera_px.is_some()) => 5.0,
-        _ => 4.6,
+        _ if films.iter().any(|film| film.camera_px.is_some()) => 5.0 * higher,
+        _ => 4.6 * higher,
     }
 }
 
@@ -127,7 +135,11 @@ const MOST_OF_COLUMN: f32 = 0.4;
 /// Returns the room for the verdict, if the other views of the column have the room `rest`: as much
 /// as its lines take in a window of 1280 x 720 px.
 fn verdict_share(told: &str, rest: f32) -> f32 {
-    let letters = |line: &str| line.replace("**", "").chars().count();
+    // Code has wider letters, and moves to the next line as a whole: it counts twice.
+    let letters = |line: &str| -> usize {
+        let parts = line.replace("**", "");
+        parts.split('`').zip([1, 2].into_iter().cycle()).map(|(part, factor)| factor * part.chars().count()).sum()
+    };
     let lines: usize = told.trim().lines().map(|line| letters(line).div_ceil(LINE_LETTERS).max(1)).sum();
     let part = ((AROUND_LINES_PX + LINE_PX * lines as f32) / WINDOW_PX).min(MOST_OF_COLUMN);
     if rest > 0.0 { rest * part / (1.0 - part) } else { 1.0 }
@@ -309,6 +321,8 @@ mod tests {
         let long = format!("{two}- **{}**\n", "x".repeat(2 * LINE_LETTERS + 1));
         assert!((height_px(&long) - height_px(two) - 3.0 * LINE_PX).abs() < 0.01);
         assert!(height_px(&long.repeat(50)) <= MOST_OF_COLUMN * WINDOW_PX + 0.01, "the other views keep their room");
+        let with_code = two.replace("COLLISION", &format!("COLLISION · with `{}`", "x".repeat(LINE_LETTERS / 2)));
+        assert!((height_px(&with_code) - height_px(two) - LINE_PX).abs() < 0.01, "code takes more room");
         assert!(verdict_share(two, 0.0) > 0.0, "a verdict alone");
     }
 }

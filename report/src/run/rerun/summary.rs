@@ -83,7 +83,8 @@ fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
 /// Appends the verdict in one word, with the sample.
 fn push_head(page: &mut String, word: &str, film: &Film) {
     let sample = film.outcome.as_ref().map_or_else(String::new, |outcome| {
-        format!(" · {} · seed {} · sample {}{}", outcome.scenario, outcome.seed, outcome.sample, conditions(film))
+        let conditions = conditions(film, quoted);
+        format!(" · {} · seed {} · sample {}{conditions}", outcome.scenario, outcome.seed, outcome.sample)
     });
     // Writing to a string cannot fail.
     let _ = write!(page, "**{word}**{sample}\n\n");
@@ -137,18 +138,30 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
     }
 }
 
-/// Returns the weather and the settings of the command line.
-fn conditions(film: &Film) -> String {
+/// Letters of the longest setting that the verdict quotes in full. The distributions of `--fitted`
+/// are settings of several hundred letters.
+const QUOTED_LETTERS: usize = 48;
+
+/// Returns a setting as the verdict quotes it: the value of a long one is left to the story.
+fn quoted(setting: &str) -> String {
+    match setting.split_once('=') {
+        Some((key, _)) if setting.chars().count() > QUOTED_LETTERS => format!("{key}=…"),
+        _ => setting.to_owned(),
+    }
+}
+
+/// Returns the weather and the settings of the command line, each as `shown` writes it.
+fn conditions(film: &Film, shown: impl Fn(&str) -> String) -> String {
     let mut text = film.weather().map_or(String::new(), |weather| format!(" · {weather}"));
     for setting in &film.settings {
-        let _ = write!(text, " · with `{setting}`");
+        let _ = write!(text, " · with `{}`", shown(setting));
     }
     text
 }
 
 /// Appends the headline and the story of a film.
 fn push_story(page: &mut String, film: &Film) {
-    let (arm, conditions) = (film.arm_label(), conditions(film));
+    let (arm, conditions) = (film.arm_label(), conditions(film, str::to_owned));
     let _ = write!(page, "### {arm}: {}{conditions}\n\n**{}**\n\n", film.title, film.headline());
     if let Some(verdict) = film.mis_summary() {
         let _ = write!(page, "{verdict}\n\n");
@@ -214,5 +227,17 @@ impl std::fmt::Display for Headway {
             Ok(thw_s) => f.write_str(&headway_text(thw_s)),
             Err(absent) => write!(f, "({absent})"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_quotes_short_settings_and_names_the_keys_of_long_ones() {
+        assert_eq!(quoted("environment.visibility-m=60"), "environment.visibility-m=60");
+        let fitted = "parameters.closing-mps={ empirical = { quantiles = [0.101, 0.247] }, note = \"us101.toml\" }";
+        assert_eq!(quoted(fitted), "parameters.closing-mps=…");
     }
 }

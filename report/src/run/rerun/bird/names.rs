@@ -8,7 +8,7 @@ use super::super::RecordingError;
 use super::super::palette;
 use super::super::stream::Writer;
 use super::super::truth::{NO_VEHICLE, belongs_to_a_vehicle};
-use super::{Canvas, MARK_ORDER, NAMES_ABOVE_M, NAMES_BELOW_M, clock_m, collision_m, is_shown_track};
+use super::{Canvas, MARK_ORDER, clock_m, collision_m, is_shown_track};
 use crate::run::film::{Frame, Part, headway_text};
 
 /// Number of vehicles that are named, by their order among the actors.
@@ -37,9 +37,7 @@ pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) ->
         .with_draw_order(MARK_ORDER)
         .with_show_labels(true);
     writer.write_static(entity, &fixed)?;
-    let y_m = |name: &Name| {
-        if name.is_above { canvas.top_m - NAMES_ABOVE_M } else { canvas.bottom_m() + NAMES_BELOW_M }
-    };
+    let y_m = |name: &Name| if name.is_above { canvas.above_m() } else { canvas.below_m() };
     writer.write_rows(entity, times, |range| {
         let all = || rows[range.clone()].iter().flatten();
         Points2D::update_fields()
