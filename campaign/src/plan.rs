@@ -196,18 +196,18 @@ impl Plan {
 
     /// Returns the rear cameras whose Mask R-CNN some sample may need.
     pub fn mask_rcnn_cameras(&self) -> impl Iterator<Item = &CameraConfig> {
-        let may_need = |file: &&ScenarioFile| {
-            file.may_have_mode(SensorMode::Full, self.sensors) && file.may_have_pipeline(Pipeline::MaskRcnn)
-        };
-        self.scenarios.iter().filter(may_need).map(|file| &file.config().sensors.rear_camera)
+        self.cameras_with(Pipeline::MaskRcnn)
     }
 
     /// Returns the files of the scenarios' own networks that classify crops in some sample.
     pub fn crop_networks(&self) -> impl Iterator<Item = &str> {
-        let may_need = |file: &&ScenarioFile| {
-            file.may_have_mode(SensorMode::Full, self.sensors) && file.may_have_pipeline(Pipeline::CropClassifier)
-        };
-        self.scenarios.iter().filter(may_need).filter_map(|file| file.config().sensors.rear_camera.model.as_deref())
+        self.cameras_with(Pipeline::CropClassifier).filter_map(|camera| camera.model.as_deref())
+    }
+
+    /// Returns the rear cameras that may have this pipeline in some sample.
+    fn cameras_with(&self, pipeline: Pipeline) -> impl Iterator<Item = &CameraConfig> {
+        let may_need = |file: &&ScenarioFile| file.may_have_mode(SensorMode::Full, self.sensors);
+        self.scenarios.iter().filter(may_need).flat_map(move |file| file.cameras_with(pipeline))
     }
 
     /// Returns the networks that some sample may need.

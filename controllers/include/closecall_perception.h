@@ -71,9 +71,9 @@ typedef struct {
     double radial_sd_mps;
 } closecall_radar;
 
-/* The rear camera, as its images have it. */
+/* A rear camera, as its images have it. */
 typedef struct {
-    double x_m;          /* lens, on the centre line, in the frame of the ego (m) */
+    double x_m;          /* lens, in the frame of the ego (m); y_m is below */
     double z_m;
     double pitch_rad;    /* positive if it looks down (rad) */
     double yaw_rad;      /* from straight behind, positive if it looks to the left of the ego (rad) */
@@ -83,6 +83,8 @@ typedef struct {
     double period_s;     /* time from an image to the next (s) */
     uint32_t width;      /* (px) */
     uint32_t height;
+    double y_m;          /* lens, to the left of the centre line (m) */
+    const char *name;
 } closecall_camera;
 
 /* The data that a perception receives when it is created. */
@@ -100,7 +102,9 @@ typedef struct {
     uint64_t lidar_count;
     const closecall_radar *radars; /* the left and the right rear radar, or none */
     uint64_t radar_count;
-    const closecall_camera *camera; /* NULL without images */
+    const closecall_camera *camera; /* the first one; NULL without images */
+    const closecall_camera *additional_cameras; /* further rear cameras; none without images */
+    uint64_t additional_camera_count;
 } closecall_perception_setup;
 
 /* A complete scan of a LiDAR, with one element of each array for each point. */
@@ -134,12 +138,14 @@ typedef struct {
     const closecall_radar_detection *detections;
 } closecall_radar_scan;
 
-/* An image of the rear camera. */
+/* An image of a rear camera. */
 typedef struct {
     int64_t time_ns; /* (ns) */
     uint32_t width;  /* (px) */
     uint32_t height;
     const uint8_t *rgb; /* red, green and blue of each pixel, row by row from the top left */
+    uint32_t additional_camera; /* index in the additional cameras of the setup; 0 in the image of the first camera, too */
+    uint32_t reserved;          /* 0 */
 } closecall_image;
 
 /* The question of one control step: what the sensors have measured, never the truth. */
@@ -159,7 +165,9 @@ typedef struct {
     uint64_t scan_count;
     const closecall_radar_scan *radar_scans; /* those that have arrived since the last question */
     uint64_t radar_scan_count;
-    const closecall_image *image; /* NULL if none is due */
+    const closecall_image *image; /* of the first camera; NULL if none is due */
+    const closecall_image *additional_images; /* of further cameras, as far as they are due */
+    uint64_t additional_image_count;
 } closecall_perception_input;
 
 /* A box for the built-in tracker. Closecall sets what has no default to NaN before the call. */
@@ -235,13 +243,13 @@ CLOSECALL_EXPORT const char *closecall_perception_version(void);
 #if UINTPTR_MAX == UINT64_MAX && defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
 _Static_assert(sizeof(closecall_lidar) == 72, "layout of closecall_lidar");
 _Static_assert(sizeof(closecall_radar) == 80, "layout of closecall_radar");
-_Static_assert(sizeof(closecall_camera) == 72, "layout of closecall_camera");
-_Static_assert(sizeof(closecall_perception_setup) == 104, "layout of closecall_perception_setup");
+_Static_assert(sizeof(closecall_camera) == 88, "layout of closecall_camera");
+_Static_assert(sizeof(closecall_perception_setup) == 120, "layout of closecall_perception_setup");
 _Static_assert(sizeof(closecall_scan) == 80, "layout of closecall_scan");
 _Static_assert(sizeof(closecall_radar_detection) == 24, "layout of closecall_radar_detection");
 _Static_assert(sizeof(closecall_radar_scan) == 32, "layout of closecall_radar_scan");
-_Static_assert(sizeof(closecall_image) == 24, "layout of closecall_image");
-_Static_assert(sizeof(closecall_perception_input) == 120, "layout of closecall_perception_input");
+_Static_assert(sizeof(closecall_image) == 32, "layout of closecall_image");
+_Static_assert(sizeof(closecall_perception_input) == 136, "layout of closecall_perception_input");
 _Static_assert(sizeof(closecall_detection) == 136, "layout of closecall_detection");
 _Static_assert(sizeof(closecall_perceived_track) == 232, "layout of closecall_perceived_track");
 _Static_assert(sizeof(closecall_perception_answer) == 32, "layout of closecall_perception_answer");

@@ -170,6 +170,7 @@ def _setup(message: Mapping[str, Any]) -> PerceptionSetup:
         lidars=tuple(_known(Lidar, one) for one in message["lidars"]),
         radars=tuple(_known(Radar, one) for one in message.get("radars") or ()),
         camera=None if camera is None else _known(Camera, camera),
+        additional_cameras=tuple(_known(Camera, one) for one in message.get("additional_cameras") or ()),
     )
 
 
@@ -182,8 +183,13 @@ def _input(message: Mapping[str, Any]) -> PerceptionInput:
         pose=_known(Pose, message["pose"]),
         scans=tuple(map(_scan, message["scans"])),
         radar_scans=tuple(map(_radar_scan, message.get("radar_scans") or ())),
-        image=None if image is None else _known(Image, {**image, "rgb": base64.b64decode(image["rgb"])}),
+        image=None if image is None else _image(image),
+        additional_images=tuple(map(_image, message.get("additional_images") or ())),
     )
+
+
+def _image(message: Mapping[str, Any]) -> Image:
+    return _known(Image, {**message, "rgb": base64.b64decode(message["rgb"])})
 
 
 def _scan(message: Mapping[str, Any]) -> LidarScan:

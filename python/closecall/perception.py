@@ -90,10 +90,12 @@ class Radar:
 
 @dataclass(frozen=True)
 class Camera:
-    """The rear camera, as its images have it."""
+    """A rear camera, as its images have it."""
 
-    #: Lens on the centre line, in the ego's frame (m).
+    name: str
+    #: Lens in the ego's frame (m).
     x_m: float
+    y_m: float
     z_m: float
     #: Positive if it looks down (rad).
     pitch_rad: float
@@ -135,8 +137,10 @@ class PerceptionSetup:
     lidars: tuple[Lidar, ...]
     #: The left and the right rear radar, or none.
     radars: tuple[Radar, ...]
-    #: ``None`` without images.
+    #: The first rear camera; ``None`` without images.
     camera: Camera | None
+    #: Further rear cameras; none without images.
+    additional_cameras: tuple[Camera, ...]
 
 
 @dataclass(frozen=True)
@@ -212,8 +216,10 @@ class RadarScan:
 
 @dataclass(frozen=True)
 class Image:
-    """An image of the rear camera."""
+    """An image of a rear camera."""
 
+    #: Name of the camera.
+    camera: str
     time_ns: int
     width: int
     height: int
@@ -234,8 +240,10 @@ class PerceptionInput:
     scans: tuple[LidarScan, ...]
     #: The scans of the rear radars that have arrived since the last question.
     radar_scans: tuple[RadarScan, ...]
-    #: ``None`` if no image is due.
+    #: The image of the first rear camera; ``None`` if none is due.
     image: Image | None
+    #: The images of further rear cameras that are due.
+    additional_images: tuple[Image, ...]
 
 
 @dataclass

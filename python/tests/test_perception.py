@@ -143,6 +143,9 @@ def test_an_object_gets_images_and_the_scans_of_radars() -> None:
                 self.images += 1
                 assert self.setup.camera is not None and input.image.width == self.setup.camera.width
                 assert len(input.image.rgb) == 3 * input.image.width * input.image.height
+                [left], [image] = self.setup.additional_cameras, input.additional_images
+                assert (left.name, left.y_m, image.camera) == ("left", 0.5, "left")
+                assert (image.width, image.height) == (left.width, left.height) and input.image.camera == "rear-camera"
             self.scans += len(input.radar_scans)
             assert all(abs(one.radial_mps) < 80.0 for scan in input.radar_scans for one in scan.detections)
             if input.time_s > 1.5:
@@ -150,6 +153,7 @@ def test_an_object_gets_images_and_the_scans_of_radars() -> None:
             return super().track(input)
 
     more = {"sensors.perception-image-hz": 5, "sensors.perception-image-step": 8, "sensors.rear-radar": "{ range-m = 300 }"}
+    more["sensors.additional-rear-cameras"] = '[{ name = "left", left-m = 0.5, resolution = { width-px = 2000 } }]'
     with pytest.raises(cc.SampleError, match="RuntimeError: 13 images, True scans"):
         cc.run(cc.Scenario.load(SCENARIO, set={**SHORT, **more}), seed=1, sensors="full", perception=Looks)
 

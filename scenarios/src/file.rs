@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::coverage::CoveragePlan;
 use crate::parameters::ParameterSpace;
 use crate::sampling::Design;
-use closecall_sensors::camera::Pipeline;
+use closecall_sensors::camera::{CameraConfig, Pipeline};
 use closecall_sensors::external::ProgramSettings;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::input;
@@ -345,11 +345,13 @@ impl ScenarioFile {
         &self.space
     }
 
-    /// Returns whether some sample may have this pipeline of the rear camera: the file names it, or
-    /// a parameter can.
-    pub fn may_have_pipeline(&self, pipeline: Pipeline) -> bool {
-        let choice = &self.config.sensors.rear_camera.pipeline;
-        self.space.extremes().any(|parameters| parameters.word(choice, "pipeline") == Ok(pipeline))
+    /// Returns the rear cameras that may have this pipeline in some sample: the file names it, or a
+    /// parameter can.
+    pub fn cameras_with(&self, pipeline: Pipeline) -> impl Iterator<Item = &CameraConfig> {
+        let may_have = move |camera: &&CameraConfig| {
+            self.space.extremes().any(|parameters| parameters.word(&camera.pipeline, "pipeline") == Ok(pipeline))
+        };
+        self.config.sensors.rear_cameras().filter(may_have)
     }
 
     /// Returns whether some sample may have this mode of the sensors, unless a command asks for the

@@ -1,6 +1,6 @@
 //! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
 
-use closecall_sensors::camera::Pipeline;
+use closecall_sensors::camera::{Camera, Pipeline};
 use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
@@ -10,7 +10,7 @@ use super::inert_object_fault::{refuse_of_map, refuse_of_objects, refuse_of_rada
 use super::intervention::FaultConfig;
 
 /// Refuses faults that cannot act: faults of sensors that do not exist in the mode of the scenario,
-/// of a front radar that a LiDAR replaces, and of a front LiDAR that does not exist, blocked
+/// of a front radar that a LiDAR replaces, and of a LiDAR or a camera that does not exist, blocked
 /// sectors outside of the field of view, mirror images without guard rails, glare of a source that
 /// does not shine into the camera, and entries that begin after the end of the run.
 ///
@@ -25,6 +25,7 @@ pub(super) fn refuse(
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     refuse_absent(fault, sensors)?;
+    refuse_of_cameras(fault, sensors)?;
     refuse_glare(fault, (sensors, road, environment))?;
     let model = sensors.full_model();
     let rear_lidars: Vec<Lidar> = model.rear_lidars().collect();
@@ -70,9 +71,7 @@ fn refuse_of_lidars(
         let half_deg = lidars.iter().filter(is_meant).map(Lidar::half_field_deg).fold(f64::INFINITY, f64::min);
         if !half_deg.is_finite() {
             let names: Vec<&str> = lidars.iter().map(Lidar::name).collect();
-            let rule = format!("no such LiDAR has this name, only `{}`", names.join("`, `"));
-            let problem = Problem::Contradiction { other: "sensors", rule };
-            return Err(at(sensor, index, ConfigError::new("sensor", problem)));
+            return Err(at(sensor, index, without_sensor("LiDAR", &names)));
         }
         for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
             let within = Range::closed(-half_deg, half_deg);
@@ -87,6 +86,29 @@ fn refuse_of_lidars(
     Ok(())
 }
 
+/// Returns the error of an entry that names no sensor of this kind.
+fn without_sensor(kind: &str, names: &[&str]) -> ConfigError {
+    let rule = format!("no such {kind} has this name, only `{}`", names.join("`, `"));
+    ConfigError::new("sensor", Problem::Contradiction { other: "sensors", rule })
+}
+
+/// Refuses names that no camera has, and names of cameras that are not used.
+fn refuse_of_cameras(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigError> {
+    let cameras: Vec<&Camera> = sensors.rear_cameras().collect();
+    for (index, entry) in fault.rear_camera.iter().enumerate() {
+        let Some(name) = &entry.sensor else { continue };
+        let error = match cameras.iter().find(|camera| camera.name == name) {
+            None => without_sensor("camera", &cameras.iter().map(|camera| camera.name).collect::<Vec<_>>()),
+            Some(camera) if camera.pipeline == Pipeline::Off => {
+                contradiction("sensor", "sensors", "a camera whose pipeline is off is not used")
+            }
+            Some(_) => continue,
+        };
+        return Err(at("rear-camera", index, error));
+    }
+    Ok(())
+}
+
 /// Refuses an entry whose only effect is glare of a source that does not shine into the camera.
 fn refuse_glare(
     fault: &FaultConfig,
@@ -97,8 +119,8 @@ fn refuse_glare(
     let is_ahead = road.is_straight() && maths::cos(sun.azimuth_rad) * maths::cos(sun.elevation_rad) >= 0.0;
     let is_day = environment.light == Light::Day;
     for (index, entry) in fault.rear_camera.iter().enumerate() {
-        let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, .. } = entry.clone();
-        let of_sun = CameraFaultConfig { sun_glare, from_s, until_s, ..CameraFaultConfig::default() };
+        let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, sensor, .. } = entry.clone();
+        let of_sun = CameraFaultConfig { sun_glare, from_s, until_s, sensor, ..CameraFaultConfig::default() };
         let of_beam = CameraFaultConfig { main_beam_glare, sun_glare: None, ..of_sun.clone() };
         let inert = [
             (*entry == of_sun && !is_day, "sun-glare", "environment.light", "the sun shines by day only"),
@@ -136,7 +158,8 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
     let radar_only = "the rear radars exist in mode `full` only";
     let object_only = "the object-level sensor behind exists in mode `object` only";
     let no_sensor = "mode `ground-truth` has no sensor that can fail";
-    let camera_is_off = mode == SensorMode::Full && sensors.camera().pipeline == Pipeline::Off;
+    let is_off = |camera: &Camera| camera.pipeline == Pipeline::Off;
+    let cameras_are_off = mode == SensorMode::Full && sensors.rear_cameras().all(is_off);
     let is_truth = mode == SensorMode::GroundTruth;
     let absent = [
         (has_lidar && mode != SensorMode::Full && !is_for_both, "rear-lidar", MODE, full_only),
@@ -165,7 +188,7 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
             "in mode `full`, a LiDAR looks ahead in place of the radar: its faults belong to `fault.front-lidar`",
         ),
         (
-            has_camera && camera_is_off,
+            has_camera && cameras_are_off,
             "rear-camera",
             "sensors.rear-camera.pipeline",
             "a camera whose pipeline is off is not used",
@@ -228,6 +251,7 @@ mod tests {
         let lidar = "[[fault.rear-lidar]]\ndead = true\n";
         let further = "sensors.additional-rear-lidars = [{ name = \"left\", mount-height-m = 0.25 }]\n";
         let camera = "[[fault.rear-camera]]\ndead = true\n";
+        let second = "sensors.additional-rear-cameras = [{ name = \"left\" }]\n";
         let behind = "[[fault.rear-object]]\ndead = true\n";
         let radar = "[[fault.front-radar]]\ndead = true\n";
         let (front, ahead) = ("sensors.front-lidar = {}\n", "[[fault.front-lidar]]\ndead = true\n");
@@ -295,6 +319,21 @@ mod tests {
             (format!("{full}{sun}"), "fault.rear-camera[0].sun-glare", "`sensors.rear-camera.sun`"),
             (format!("{full}{low_sun}{night}{sun}"), "fault.rear-camera[0].sun-glare", "by day only"),
             (format!("{full}{beam}"), "fault.rear-camera[0].main-beam-glare", "`environment.light`"),
+            (
+                format!("{full}{second}{camera}sensor = \"right\"\n"),
+                "fault.rear-camera[0].sensor",
+                "`rear-camera`, `left`",
+            ),
+            (
+                format!("{full}{is_off}{second}{camera}sensor = \"rear-camera\"\n"),
+                "fault.rear-camera[0].sensor",
+                "pipeline is off",
+            ),
+            (
+                format!("{full}{second}{sun}sensor = \"left\"\n"),
+                "fault.rear-camera[0].sun-glare",
+                "`sensors.rear-camera.sun`",
+            ),
             (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
             (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
             (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
@@ -310,6 +349,7 @@ mod tests {
         }
         for keys in [
             format!("{full}{lidar}{camera}{radar}"),
+            format!("{full}{is_off}{second}{camera}sensor = \"left\"\n"),
             format!("{full}{low_sun}{sun}"),
             format!("{full}{night}{beam}"),
             format!("{full}{sun}dirt = 0.1\n"),

@@ -6,7 +6,8 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Ra
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{Camera, CameraConfig, Pipeline, Sun};
+use crate::camera::{Camera, CameraConfig, Pipeline, RearCamera, Sun};
+use crate::detection_classifier::DetectionClassifier;
 use crate::external::{
     BUILT_IN, DEFAULT_IMAGE_STEP, DEFAULT_PROGRAM_MEMORY_MIB, DEFAULT_PROGRAM_TIMEOUT_MS, OutsideCamera,
     PerceptionProgram, ProgramChecks, ProgramSettings, check_program,
@@ -14,6 +15,8 @@ use crate::external::{
 use crate::faults::{ActingSensors, Faults, OdometryErrors, StatedFault};
 use crate::image_detector::ImageDetector;
 use crate::lidar::{ClusteringCheck, ClusteringMethod, ClusteringModel, FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
+use crate::sensor_name::{check_further, same_name};
+use crate::several_cameras::{CameraMember, MAX_ADDITIONAL_CAMERAS, SeveralCameras};
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
     Alterations, FittedErrors, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey,
@@ -75,13 +78,13 @@ pub struct SensorsConfig {
     /// then runs a program: read a file of somebody else before you run it.
     #[serde(skip_serializing_if = "is_built_in")]
     pub perception: String,
-    /// Time limit of each answer of that program (ms). The first may take 10 s. Default: 1000.
+    /// Time limit of each answer of that program (ms). The first answer may take 10 s. Default: 1000.
     #[serde(skip_serializing_if = "is_default_timeout")]
     pub perception_timeout_ms: u64,
     /// Memory limit of that program and its descendants (MiB). Default: 1024.
     #[serde(skip_serializing_if = "is_default_memory")]
     pub perception_memory_mib: u64,
-    /// Images of the rear camera that the program gets per second (Hz): 0 to 25. An image comes with
+    /// Images of each rear camera that the program gets per second (Hz): 0 to 25. An image comes with
     /// the first scan that is due. Default: 0, none.
     #[serde(skip_serializing_if = "is_none")]
     pub perception_image_hz: Num,
@@ -111,6 +114,11 @@ pub struct SensorsConfig {
     pub rear_radar: Option<RearRadarConfig>,
     /// The rear camera, whose network classifies each cluster of the rear LiDAR.
     pub rear_camera: CameraConfig,
+    /// Further rear cameras, at most three, each with a name, a mounting, a lens, a size and a
+    /// network of its own: mode `full`. The camera that sees a cluster best classifies it. `sun` and
+    /// `night-sky` are keys of the first camera only. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub additional_rear_cameras: Vec<CameraConfig>,
     /// The tracker that processes the boxes of the rear LiDAR.
     pub tracker: TrackerConfig,
 }
@@ -171,6 +179,7 @@ impl Default for SensorsConfig {
             front_lidar: None,
             rear_radar: None,
             rear_camera: CameraConfig::default(),
+            additional_rear_cameras: Vec::new(),
             tracker: TrackerConfig::default(),
         }
     }
@@ -182,6 +191,7 @@ pub struct Sensors {
     mode: SensorMode,
     full: FullModel,
     camera: Camera,
+    additional_cameras: [Option<Camera>; MAX_ADDITIONAL_CAMERAS],
     rear_object: ObjectSensorModel,
     altered: Alterations,
     has_rear: bool,
@@ -201,6 +211,13 @@ impl Check for SensorsConfig {
             None => None,
         };
         let additional_rear_lidars = self.check_additional([Some(rear_lidar), front_lidar], parameters)?;
+        let camera = self.rear_camera.check(parameters).map_err(within("rear-camera"))?;
+        let additional_cameras = check_further(
+            ("additional-rear-cameras", "at most three further cameras"),
+            &self.additional_rear_cameras,
+            vec![camera.name],
+            |further| further.check_further(&camera, parameters),
+        )?;
         let rear_radar = match &self.rear_radar {
             Some(radar) => Some(radar.check(parameters).map_err(within("rear-radar"))?),
             None => None,
@@ -226,7 +243,8 @@ impl Check for SensorsConfig {
                 front_lidar,
                 tracker: self.tracker.check(parameters).map_err(within("tracker"))?,
             },
-            camera: self.rear_camera.check(parameters).map_err(within("rear-camera"))?,
+            camera,
+            additional_cameras,
             rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
             altered: Alterations::default(),
             has_rear: true,
@@ -257,34 +275,20 @@ impl SensorsConfig {
         configured: [Option<Lidar>; 2],
         parameters: &Parameters,
     ) -> Result<[Option<Lidar>; MAX_ADDITIONAL_LIDARS], ConfigError> {
-        const KEY: &str = "additional-rear-lidars";
-        let mut names: Vec<&str> = configured.iter().flatten().map(Lidar::name).collect();
+        let names: Vec<&'static str> = configured.iter().flatten().map(Lidar::name).collect();
         if let [rear, front] = names[..]
             && rear == front
         {
-            return Err(same_name(rear).within("front-lidar"));
+            return Err(same_name::<Lidar>(rear).within("front-lidar"));
         }
-        if self.additional_rear_lidars.len() > MAX_ADDITIONAL_LIDARS {
-            let value = self.additional_rear_lidars.len() as u64;
-            return Err(ConfigError::new(KEY, Problem::WrongCount { value, allowed: "at most three further LiDARs" }));
-        }
-        let mut checked = [None; MAX_ADDITIONAL_LIDARS];
-        for (index, (slot, config)) in checked.iter_mut().zip(&self.additional_rear_lidars).enumerate() {
-            let located = |error: ConfigError| error.within_index(index).within(KEY);
-            let lidar = config.check_named(None, parameters).map_err(located)?;
-            if names.contains(&lidar.name()) {
-                return Err(located(same_name(lidar.name())));
-            }
-            names.push(lidar.name());
-            *slot = Some(lidar);
-        }
-        Ok(checked)
+        let list = ("additional-rear-lidars", "at most three further LiDARs");
+        check_further(list, &self.additional_rear_lidars, names, |lidar| lidar.check_named(None, parameters))
     }
-}
 
-fn same_name(name: &str) -> ConfigError {
-    let rule = format!("another LiDAR is called `{name}`, too, and faults could not tell them apart");
-    ConfigError::new("name", Problem::Contradiction { other: "name", rule })
+    /// Returns the rear cameras, the first one first.
+    pub fn rear_cameras(&self) -> impl Iterator<Item = &CameraConfig> {
+        std::iter::once(&self.rear_camera).chain(&self.additional_rear_cameras)
+    }
 }
 
 impl Sensors {
@@ -323,9 +327,14 @@ impl Sensors {
         Err(ConfigError::new("perception", Problem::Contradiction { other: "mode", rule }))
     }
 
-    /// Returns the model of the rear camera, which exists in every mode.
+    /// Returns the model of the first rear camera, which exists in every mode.
     pub fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// Returns the models of all rear cameras, the first one first.
+    pub fn rear_cameras(&self) -> impl Iterator<Item = &Camera> {
+        std::iter::once(&self.camera).chain(self.additional_cameras.iter().flatten())
     }
 
     /// Returns the models of mode [`SensorMode::Full`], which exist in every mode.
@@ -414,7 +423,9 @@ impl Sensors {
     /// Returns the same sensors under a sun at another place.
     #[must_use]
     pub fn with_sun(self, sun: Sun) -> Self {
-        Self { camera: Camera { sun, ..self.camera }, ..self }
+        let under_sun = |camera: Camera| Camera { sun, ..camera };
+        let additional_cameras = self.additional_cameras.map(|camera| camera.map(under_sun));
+        Self { camera: under_sun(self.camera), additional_cameras, ..self }
     }
 
     /// Checks that no fault puts a LiDAR lower than the model covers.
@@ -490,6 +501,36 @@ impl Sensors {
         [front, self.full.surround.latency_steps(), rear]
     }
 
+    /// Returns the cameras of one run with their networks, if any has one.
+    fn cameras(&self, key: &NoiseKey) -> Option<Box<dyn DetectionClassifier>> {
+        let faults = &self.altered.faults.rear_camera;
+        let member = |(number, camera): (usize, &Camera)| {
+            let faults = faults.of_sensor(camera.name);
+            let classifier: Box<dyn DetectionClassifier> = match camera.pipeline {
+                Pipeline::Off => return None,
+                Pipeline::MaskRcnn => Box::new(ImageDetector::new((number, *camera), key, faults)),
+                Pipeline::CropClassifier => Box::new(WorkerClassifier::new((number, *camera), key, faults)),
+            };
+            Some(CameraMember { camera: RearCamera::new(*camera), faults, classifier })
+        };
+        let mut members: Vec<CameraMember> = self.rear_cameras().enumerate().filter_map(member).collect();
+        match members.len() {
+            0 | 1 => members.pop().map(|only| only.classifier),
+            _ => Some(Box::new(SeveralCameras::new(members))),
+        }
+    }
+
+    /// Returns the cameras of one run whose images a program gets.
+    fn outside_cameras(&self, key: &NoiseKey) -> Vec<OutsideCamera> {
+        let faults = &self.altered.faults.rear_camera;
+        let images = self.program.and_then(|program| program.images).into_iter();
+        let cameras = images.flat_map(|images| self.rear_cameras().enumerate().map(move |camera| (images, camera)));
+        let outside = |(images, camera): (_, (usize, &Camera))| {
+            OutsideCamera::new(camera, images, key, faults.of_sensor(camera.1.name))
+        };
+        cameras.map(outside).collect()
+    }
+
     /// Builds the perception of one run, whose random streams are keyed by `key`.
     ///
     /// # Errors
@@ -530,21 +571,10 @@ impl Sensors {
                 if !self.has_rear {
                     return Ok(Box::new(perception.without_rear()));
                 }
-                let faults = self.altered.faults.rear_camera;
-                let images = self.program.and_then(|program| program.images);
-                let camera = images.map(|images| OutsideCamera::new(self.camera, images, rear_key, faults));
-                let perception = perception.with_program(program, camera);
-                match (self.altered.classifier(), self.camera.pipeline) {
-                    (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
-                    (None, Pipeline::Off) => Box::new(perception),
-                    (None, Pipeline::MaskRcnn) => {
-                        let detector = ImageDetector::new(self.camera, rear_key, faults);
-                        Box::new(perception.with_classifier(Box::new(detector)))
-                    }
-                    (None, Pipeline::CropClassifier) => {
-                        let classifier = WorkerClassifier::new(self.camera, rear_key, faults);
-                        Box::new(perception.with_classifier(Box::new(classifier)))
-                    }
+                let perception = perception.with_program(program, self.outside_cameras(rear_key));
+                match self.altered.classifier().or_else(|| self.cameras(rear_key)) {
+                    Some(classifier) => Box::new(perception.with_classifier(classifier)),
+                    None => Box::new(perception),
                 }
             }
         })
@@ -635,5 +665,64 @@ mod tests {
         let five = "{ name = \"a\" }, { name = \"b\" }, { name = \"c\" }, { name = \"d\" }";
         assert!(error(&format!("additional-rear-lidars = [{five}]")).contains("at most three further LiDARs"));
         assert!(error("additional-rear-lidars = [{ name = \"a\", azimuth-deg = 90 }]").contains("[0].azimuth-deg"));
+    }
+
+    #[test]
+    fn several_rear_cameras_have_names_of_their_own_and_one_sky() {
+        let sensors =
+            check("rear-camera.sun.azimuth-rad = 3.1\nadditional-rear-cameras = [{ name = \"left\", yaw-deg = 30 }]");
+        let cameras: Vec<Camera> = sensors.unwrap().rear_cameras().copied().collect();
+        assert_eq!(cameras.iter().map(|camera| camera.name).collect::<Vec<_>>(), ["rear-camera", "left"]);
+        assert_eq!((cameras[1].sun, cameras[0].yaw_rad), (cameras[0].sun, 0.0));
+        let moved = Sun { azimuth_rad: 0.5, ..cameras[0].sun };
+        assert!(
+            check("additional-rear-cameras = [{ name = \"left\" }]")
+                .unwrap()
+                .with_sun(moved)
+                .rear_cameras()
+                .all(|camera| camera.sun == moved)
+        );
+        let error = |text: &str| check(text).unwrap_err().to_string();
+        for (cameras, key, why) in [
+            ("{}", "`additional-rear-cameras[0].name`", "each of several sensors needs a name"),
+            (
+                "{ name = \"rear-camera\" }",
+                "`additional-rear-cameras[0].name`",
+                "another camera is called `rear-camera`",
+            ),
+            ("{ name = \"a\" }, { name = \"a\" }", "`additional-rear-cameras[1].name`", "another camera is called `a`"),
+            ("{ name = \"A b\" }", "`additional-rear-cameras[0].name`", "`A b` is no name"),
+            (
+                "{ name = \"a\" }, { name = \"b\" }, { name = \"c\" }, { name = \"d\" }",
+                "`additional-rear-cameras` is 4",
+                "at most three further cameras",
+            ),
+            (
+                "{ name = \"a\", resolution.width-px = 0 }",
+                "`additional-rear-cameras[0].resolution.width-px` is 0",
+                "640",
+            ),
+            ("{ name = \"a\", yaw-deg = 60 }", "`additional-rear-cameras[0].yaw-deg` is 60", "from -55 to 55"),
+            ("{ name = \"a\", left-m = 2 }", "`additional-rear-cameras[0].left-m` is 2", "from -1.3 to 1.3"),
+            ("{ name = \"a\", night-sky = 0.5 }", "`additional-rear-cameras[0].night-sky`", "the same sky"),
+            ("{ name = \"a\", sun.azimuth-rad = 3.0 }", "`additional-rear-cameras[0].sun`", "`rear-camera.sun`"),
+        ] {
+            let message = error(&format!("additional-rear-cameras = [{cameras}]"));
+            assert!(message.contains(key) && message.contains(why), "{cameras}: {message}");
+        }
+        let misspelt = toml::from_str::<SensorsConfig>("additional-rear-cameras = [{ name = \"a\", yaw-dg = 3 }]");
+        assert!(misspelt.unwrap_err().to_string().contains("yaw-dg"));
+        assert!(!toml::to_string(&SensorsConfig::default()).unwrap().contains("additional"));
+    }
+
+    #[test]
+    fn further_cameras_change_nothing_at_object_level() {
+        let sensors = |more: &str| check(&format!("mode = \"object\"\n{more}")).unwrap();
+        let (usual, with_further) = (sensors(""), sensors("additional-rear-cameras = [{ name = \"left\" }]"));
+        assert_eq!(
+            (usual.full, usual.rear_object, usual.camera),
+            (with_further.full, with_further.rear_object, with_further.camera)
+        );
+        assert_eq!(usual.latency_steps(), with_further.latency_steps());
     }
 }

@@ -15,9 +15,9 @@ pub trait DetectionClassifier: Send {
         &[]
     }
 
-    /// Returns the latest image that a network has evaluated as a whole. Usually none.
-    fn rear_image(&self) -> Option<&RearImage> {
-        None
+    /// Returns the latest image of each camera that a network has evaluated as a whole. Usually none.
+    fn rear_images(&self) -> Vec<&RearImage> {
+        Vec::new()
     }
 
     /// Returns the health of that sensor.

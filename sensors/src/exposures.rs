@@ -3,18 +3,27 @@
 
 use closecall_traffic::{Environment, Road, Stream, Time};
 
-use crate::camera::{CameraFault, ExposureKey};
+use crate::camera::{Camera, CameraFault, ExposureKey};
 use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
 use crate::{Health, NoiseKey, Scene, SceneVehicle};
 
-/// Name of the camera's random stream.
+/// Name of the random stream of the first camera.
 const CHANNEL: &str = "rear-camera";
 
-/// Returns the noise keys of the rear camera's exposures in one run, scan by scan.
+/// Returns the random stream of the camera with this number in the scenario.
+fn stream_of(key: &NoiseKey, (number, camera): (usize, &Camera)) -> Stream {
+    match number {
+        0 => key.stream(CHANNEL),
+        _ => key.stream(&format!("{CHANNEL}/{}", camera.name)),
+    }
+}
+
+/// Returns the noise keys of the exposures in one run, scan by scan, of the rear camera with this
+/// number in the scenario.
 ///
 /// With the key of an exposure, its image can be rendered again.
-pub fn rear_exposures(key: &NoiseKey) -> impl Iterator<Item = ExposureKey> + use<> {
-    let mut exposures = key.stream(CHANNEL);
+pub fn rear_exposures(key: &NoiseKey, camera: (usize, &Camera)) -> impl Iterator<Item = ExposureKey> + use<> {
+    let mut exposures = stream_of(key, camera);
     std::iter::repeat_with(move || ExposureKey::draw(&mut exposures))
 }
 
@@ -47,9 +56,10 @@ impl Exposure {
 }
 
 impl Exposures {
-    /// Creates the exposures of a camera with these faults, whose noise is keyed by `key`.
-    pub(crate) fn new(key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
-        Self { keys: key.stream(CHANNEL), faults, held: None, failed_scans: 0 }
+    /// Creates the exposures of the camera with this number, which has these faults. `key` is the key
+    /// of its noise.
+    pub(crate) fn new(camera: (usize, &Camera), key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+        Self { keys: stream_of(key, camera), faults, held: None, failed_scans: 0 }
     }
 
     /// Returns the exposure of a scan. Each scan draws a key, even if it needs no image: both arms

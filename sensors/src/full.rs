@@ -104,15 +104,11 @@ impl FullPerception {
     /// Returns the same sensors, whose scans behind the program processes in place of the built-in
     /// chain.
     #[must_use]
-    pub(crate) fn with_program(
-        self,
-        program: Option<Box<dyn PerceptionProgram>>,
-        camera: Option<OutsideCamera>,
-    ) -> Self {
+    pub(crate) fn with_program(self, program: Option<Box<dyn PerceptionProgram>>, cameras: Vec<OutsideCamera>) -> Self {
         let latency_s = self.model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
         let lidars = self.model.rear_lidars();
         let sensors = (lidars.collect(), self.model.rear_radar);
-        let outside = program.map(|program| Outside::new(program, sensors, camera, latency_s));
+        let outside = program.map(|program| Outside::new(program, sensors, cameras, latency_s));
         let rear = if outside.is_some() { self.rear.map(LidarChain::with_program) } else { self.rear };
         Self { outside, rear, ..self }
     }
@@ -167,7 +163,7 @@ impl FullPerception {
         Ok(())
     }
 
-    /// Returns the worse of the health of the LiDARs and of the camera.
+    /// Returns the worse of the health of the LiDARs and of the cameras.
     fn rear_health(&self) -> Health {
         let lidars = self.rear.as_ref().map_or(Health::Ok, LidarChain::health);
         match self.classifier.as_ref().map_or(Health::Ok, |classifier| classifier.health()) {
@@ -199,9 +195,9 @@ impl Perception for FullPerception {
     fn alarms(&self) -> SensorAlarms {
         let front = self.front_lidar.as_ref().map_or_else(|| self.front.alarms(), FrontLidar::alarms);
         let lidars = self.rear.as_ref().map_or(Alarms::NONE, LidarChain::alarms);
-        // The monitor of the camera notices only that nothing new arrives.
-        let camera = self.classifier.as_ref().map_or(Health::Ok, |classifier| classifier.health());
-        let rear = lidars.with_if(Alarm::NothingNew, camera == Health::Failed);
+        // The monitor of a camera notices only that nothing new arrives.
+        let cameras = self.classifier.as_ref().map_or(Health::Ok, |classifier| classifier.health());
+        let rear = lidars.with_if(Alarm::NothingNew, cameras != Health::Ok);
         SensorAlarms { front, surround: self.surround.alarms(), rear }
     }
 
@@ -222,8 +218,8 @@ impl Perception for FullPerception {
         self.rear.as_ref().and_then(LidarChain::rear_radars)
     }
 
-    fn rear_image(&self) -> Option<&RearImage> {
-        self.classifier.as_ref().and_then(|classifier| classifier.rear_image())
+    fn rear_images(&self) -> Vec<&RearImage> {
+        self.classifier.as_ref().map_or(Vec::new(), |classifier| classifier.rear_images())
     }
 
     fn rear_fields(&self) -> Vec<FieldOfView> {

@@ -21,6 +21,7 @@ use crate::detection_classifier::DetectionClassifier;
 use crate::exposures::{Exposure, Exposures};
 use crate::faults::FaultList;
 use crate::image_evidence::{Evidence, Exposed, ImageResult, associate, moved};
+use crate::several_cameras::MAX_CAMERAS;
 use crate::worker_classifier::inference_backend;
 use crate::{Detection, Extent, Health, NoiseKey, RearImage, Scene, SensorError};
 
@@ -32,8 +33,10 @@ const GATE_M: [f64; 2] = [2.0, 1.0];
 const KEPT_FOR: Time = Time::from_ms(200);
 
 thread_local! {
-    /// The thread's network with the camera that it was built for.
-    static NETWORK: RefCell<Option<(Camera, WholeImageDetector)>> = const { RefCell::new(None) };
+    /// The thread's networks, in the order of the scenario's cameras, each with the camera that it
+    /// was built for.
+    static NETWORKS: RefCell<[Option<(Camera, WholeImageDetector)>; MAX_CAMERAS]> =
+        const { RefCell::new([const { None }; MAX_CAMERAS]) };
 }
 
 /// An object that the LiDAR has detected in successive scans.
@@ -57,6 +60,8 @@ struct Pending {
 
 /// The camera of one run with the Mask R-CNN of its thread.
 pub(crate) struct ImageDetector {
+    /// Number of the camera in the scenario.
+    number: usize,
     camera: Camera,
     exposures: Exposures,
     next_image: Option<Time>,
@@ -74,11 +79,12 @@ pub(crate) struct ImageDetector {
 }
 
 impl ImageDetector {
-    /// Creates the camera of one run, whose exposure noise is keyed by `key`.
-    pub(crate) fn new(camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+    /// Creates the camera of one run with its number in the scenario. `key` is the key of its noise.
+    pub(crate) fn new((number, camera): (usize, Camera), key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
         Self {
+            number,
             camera,
-            exposures: Exposures::new(key, faults),
+            exposures: Exposures::new((number, &camera), key, faults),
             next_image: None,
             next_id: 0,
             objects: Vec::new(),
@@ -122,7 +128,8 @@ impl ImageDetector {
     fn expose(&mut self, scene: &Scene<'_>, exposure: Exposure, detections: &[Detection]) -> Result<(), SensorError> {
         let imaged = self.exposures.imaged(scene);
         let failed = |error: crate::camera::ClassifierError| SensorError::Classifier { reason: error.to_string() };
-        let (result, instances) = NETWORK.with_borrow_mut(|slot| {
+        let (result, instances) = NETWORKS.with_borrow_mut(|slots| {
+            let slot = &mut slots[self.number];
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
                 *slot = Some((self.camera, WholeImageDetector::new(self.camera, inference_backend()).map_err(failed)?));
             }
@@ -130,7 +137,8 @@ impl ImageDetector {
             let instances = network.detect(&imaged, exposure.key, exposure.fault.as_ref()).map_err(failed)?;
             Ok((associate(network.camera(), scene, &instances, detections), instances))
         })?;
-        self.latest = Some(RearImage { time: scene.time, shown_time: imaged.time, instances });
+        self.latest =
+            Some(RearImage { camera: self.camera.name, time: scene.time, shown_time: imaged.time, instances });
         let due = scene.time + seconds(self.camera.mask_rcnn.latency_s);
         let exposed = Exposed { time: scene.time, ego: scene.ego };
         self.pending.push_back(Pending { due, exposed, ids: self.ids.clone(), result });
@@ -179,8 +187,8 @@ impl DetectionClassifier for ImageDetector {
         &self.alone
     }
 
-    fn rear_image(&self) -> Option<&RearImage> {
-        self.latest.as_ref()
+    fn rear_images(&self) -> Vec<&RearImage> {
+        self.latest.iter().collect()
     }
 
     fn health(&self) -> Health {

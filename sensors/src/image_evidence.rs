@@ -174,6 +174,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
     let depth_m = camera.depth_m(&scene.ego, x_m).filter(|depth_m| *depth_m <= MAX_ALONE_M)?;
     let typical = instance.class.typical_dimensions();
     let focal_px = camera.camera().focal_px;
+    let slope = (y_m - camera.camera().left_m) / depth_m;
     let widening = camera.widening([left, right]);
     let width_m = (right - left) / focal_px * widening * depth_m;
     // The distance is h / tan β: its derivative by β is −h / sin² β, which is about d / tan β.
@@ -185,7 +186,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         face_x_m: x_m,
         face_y_m: y_m,
         range_sd_m,
-        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / focal_px * widening, y_m / depth_m * range_sd_m),
+        lateral_sd_m: maths::hypot(depth_m * EDGE_SD_PX / focal_px * widening, slope * range_sd_m),
         heading_rad: lane.direction_rad(x_m),
         length_m: typical.length_m,
         length: Extent::Assumed,

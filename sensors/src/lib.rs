@@ -25,6 +25,7 @@ mod ground_truth;
 mod half_turn;
 mod image_detector;
 mod image_evidence;
+mod joint_health;
 mod kept;
 pub mod lidar;
 mod lidar_chain;
@@ -33,6 +34,8 @@ mod object;
 mod perception;
 mod radar;
 mod recorded;
+mod sensor_name;
+mod several_cameras;
 mod surroundings;
 #[cfg(test)]
 mod testing;
@@ -61,4 +64,5 @@ pub use object::{
 pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorAlarms, SensorHealth, UsedBox};
 pub use radar::{MountedRadars, RadarReturn, RadarSource, RearRadar, RearRadarConfig};
 pub use recorded::{RecordedPerception, RecordedScanError};
+pub use several_cameras::MAX_ADDITIONAL_CAMERAS;
 pub use worker_classifier::{inference_backend, set_inference_backend};

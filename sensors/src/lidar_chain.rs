@@ -33,9 +33,8 @@ use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar, UsedBox};
 use crate::radar::{MountedRadars, RearRadars};
 use crate::surroundings::OtherVehicle;
-use crate::{Alterations, Detection, Health, Scene, SensorError};
+use crate::{Alterations, Detection, Health, Scene, SensorError, joint_health};
 
-mod health;
 mod road_watch;
 mod sensor;
 
@@ -363,7 +362,7 @@ impl LidarChain {
     /// Returns the health of the sensors together. Without a radar the chain works, less well.
     pub(crate) fn health(&self) -> Health {
         let radars = self.radars.as_ref().map_or(Health::Ok, RearRadars::health);
-        match health::of_all(&self.sensors) {
+        match joint_health::of_all(&self.sensors, |sensor| sensor.health, |sensor| sensor.view(0.0)) {
             Health::Ok if radars != Health::Ok => Health::Degraded,
             health => health,
         }

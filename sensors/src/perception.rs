@@ -110,6 +110,8 @@ pub struct UsedBox {
 /// The latest image that a network has evaluated as a whole, for display.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RearImage {
+    /// Name of the camera.
+    pub camera: &'static str,
     /// Time of the exposure.
     pub time: Time,
     /// Time of the scene that the image shows: the time of the exposure, unless the camera is
@@ -169,10 +171,10 @@ pub trait Perception: Send {
         None
     }
 
-    /// Returns the latest image of the rear camera that a network has evaluated as a whole. Returns
-    /// `None` if no network does.
-    fn rear_image(&self) -> Option<&RearImage> {
-        None
+    /// Returns the latest image of each rear camera that a network has evaluated as a whole. Returns
+    /// none if no network does.
+    fn rear_images(&self) -> Vec<&RearImage> {
+        Vec::new()
     }
 
     /// Returns the fields of view of the rear sensors. Returns none if their limits are not

@@ -11,14 +11,17 @@ use crate::camera::{Backend, Camera, CameraFault, CropClassifier, ImageMemory, I
 use crate::detection_classifier::DetectionClassifier;
 use crate::exposures::Exposures;
 use crate::faults::FaultList;
+use crate::several_cameras::MAX_CAMERAS;
 use crate::{Detection, Health, NoiseKey, Scene, SensorError};
 
 /// The inference backend of this process.
 static BACKEND: OnceLock<Backend> = OnceLock::new();
 
 thread_local! {
-    /// The thread's network with the camera that it was built for.
-    static NETWORK: RefCell<Option<(Camera, CropClassifier)>> = const { RefCell::new(None) };
+    /// The thread's networks, in the order of the scenario's cameras, each with the camera that it
+    /// was built for.
+    static NETWORKS: RefCell<[Option<(Camera, CropClassifier)>; MAX_CAMERAS]> =
+        const { RefCell::new([const { None }; MAX_CAMERAS]) };
 }
 
 /// Sets the inference backend of this process; the default is tract.
@@ -35,15 +38,18 @@ pub fn inference_backend() -> &'static Backend {
 
 /// The camera of one run. It classifies with the network of its thread.
 pub(crate) struct WorkerClassifier {
+    /// Number of the camera in the scenario.
+    number: usize,
     camera: Camera,
     exposures: Exposures,
     memory: ImageMemory,
 }
 
 impl WorkerClassifier {
-    /// Creates the camera of one run, whose exposure noise is keyed by `key`.
-    pub(crate) fn new(camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
-        Self { camera, exposures: Exposures::new(key, faults), memory: ImageMemory::default() }
+    /// Creates the camera of one run with its number in the scenario. `key` is the key of its noise.
+    pub(crate) fn new((number, camera): (usize, Camera), key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+        let exposures = Exposures::new((number, &camera), key, faults);
+        Self { number, camera, exposures, memory: ImageMemory::default() }
     }
 }
 
@@ -56,7 +62,8 @@ impl DetectionClassifier for WorkerClassifier {
         let imaged = self.exposures.imaged(scene);
         let seen = ImagedScene { now: scene, imaged: &imaged, fault: exposure.fault.as_ref() };
         let memory = &mut self.memory;
-        NETWORK.with_borrow_mut(|slot| {
+        NETWORKS.with_borrow_mut(|slots| {
+            let slot = &mut slots[self.number];
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
                 let backend = inference_backend();
                 let network = CropClassifier::new(self.camera, backend)

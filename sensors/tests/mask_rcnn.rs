@@ -108,6 +108,30 @@ fn at_side(detections: &[Detection], y_m: f64) -> &Detection {
 }
 
 #[test]
+fn a_second_equal_camera_adds_no_evidence_and_no_vehicle() {
+    if !has_backend() {
+        return;
+    }
+    let twin = "additional-rear-cameras = [{ name = 'twin', pipeline = 'mask-rcnn', mask-rcnn = { latency-s = 0.2 } }]";
+    let several = format!("{SENSORS}{twin}");
+    let others = |time_s| {
+        vec![
+            behind(VehicleClass::Truck, time_s, [30.0, 0.0], 0.0),
+            behind(VehicleClass::Car, time_s, [18.0, 3.75], 0.0),
+        ]
+    };
+    // A LiDAR that is blocked on the left leaves the car to the cameras.
+    for lidar in ["", "blocked-from-deg = 2.0\nblocked-to-deg = 40.0"] {
+        let [one, two] = [SENSORS, &several].map(|sensors| run(sensors, lidar, 20, others));
+        assert!(one == two, "{lidar}");
+        let is_alone = |seen: &Detection| seen.seen_by == closecall_sensors::SeenBy::CameraAlone;
+        assert_eq!(one.iter().flatten().any(is_alone), !lidar.is_empty());
+    }
+    let shown = perception(&several, faults("", "")).rear_images().len();
+    assert_eq!(shown, 0, "no image before the first step");
+}
+
+#[test]
 fn the_shown_image_has_the_instances_that_the_detector_finds_in_the_scene() {
     let Some(library) = closecall_testing::onnxruntime() else { return };
     set_inference_backend(Backend::OnnxRuntime(library.clone()));
@@ -121,7 +145,8 @@ fn the_shown_image_has_the_instances_that_the_detector_finds_in_the_scene() {
     let scene = Scene { time: CONTROL_STEP, road: &road, environment: &environment, ego, others: &others };
     let mut perception = perception(SENSORS, faults("", ""));
     perception.step(&Scene { time: Time::ZERO, ..scene }).expect("valid settings and scenes");
-    let shown = perception.rear_image().expect("an image at the first step");
+    let images = perception.rear_images();
+    let shown = *images.first().expect("an image at the first step");
     assert_eq!((shown.time, shown.shown_time), (Time::ZERO, Time::ZERO));
     // The noise is another, so that boxes differ by little.
     let scene = Scene { time: Time::ZERO, ..scene };

@@ -75,7 +75,7 @@ pub(super) fn check_backend_of(scenario: &Scenario, arms: &[Arm]) -> Result<(), 
     let is_full = |arm: &Arm| arm.sensors.unwrap_or(scenario.sensors.mode()) == SensorMode::Full;
     let is_used = arms.iter().any(is_full);
     if is_used {
-        check_camera(scenario.sensors.camera())?;
+        scenario.sensors.rear_cameras().try_for_each(check_camera)?;
     }
     check_backend(is_used)
 }

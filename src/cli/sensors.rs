@@ -64,7 +64,7 @@ pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
         if choice == SensorsChoice::Full
             && let Ok(nominal) = file.concrete(&file.space().nominal())
         {
-            check_camera(nominal.sensors.camera())?;
+            nominal.sensors.rear_cameras().try_for_each(check_camera)?;
         }
         let of_file = |on_progress: &(dyn Fn([u64; 2]) + Sync)| {
             Study::watched(&file, Some(choice.mode()), args.seed, extent, on_progress)

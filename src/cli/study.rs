@@ -170,8 +170,8 @@ impl StudyArgs {
         let file = self.set.load(&self.scenario)?;
         let is_full = file.may_have_mode(SensorMode::Full, self.sensors.map(SensorsChoice::mode));
         check_backend(is_full)?;
-        if is_full && file.may_have_pipeline(Pipeline::MaskRcnn) {
-            check_cameras([&file.config().sensors.rear_camera])?;
+        if is_full {
+            check_cameras(file.cameras_with(Pipeline::MaskRcnn))?;
         }
         Ok(file)
     }

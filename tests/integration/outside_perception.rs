@@ -15,6 +15,9 @@ use crate::support::{closecall, code, folder, json, json_file, library, message,
 /// The perception of the tests, with its kind of answers and its fault.
 const GROUPS: &str = "python3 tests/fixtures/perceptions/groups.py";
 
+/// A second camera, with another place, direction and size.
+pub(crate) const SECOND_CAMERA: &str = "sensors.additional-rear-cameras=[{ name = \"left\", left-m = 0.5, yaw-deg = 20, resolution = { width-px = 2000 } }]";
+
 fn setting(command: &str) -> String {
     format!("sensors.perception=\"exec:{command}\"")
 }
@@ -117,7 +120,7 @@ fn a_program_gets_the_images_that_it_is_to_have() {
     let camera = ["resolution.width-px=1921", "resolution.height-px=1208", "yaw-deg=12"];
     let of_camera: Vec<String> = camera.map(|setting| format!("sensors.rear-camera.{setting}")).into();
     let others = of_camera.iter().flat_map(|setting| ["--set", setting.as_str()]);
-    let args: Vec<&str> = args.iter().copied().chain(others).collect();
+    let args: Vec<&str> = args.iter().copied().chain(others).chain(["--set", SECOND_CAMERA]).collect();
     stdout(&run("low-thw-overtake", &format!("{GROUPS} tracks"), &args), 0);
     let output = closecall(["check", "low-thw-overtake", "--set", "sensors.perception-image-hz=50"]);
     assert_eq!(code(&output), 3, "{}", message(&output));

@@ -6,7 +6,7 @@ use std::process::Output;
 
 use crate::exec_controller::left_behind;
 use crate::native_controllers::{compile, lib, with_fault};
-use crate::outside_perception::assert_drives;
+use crate::outside_perception::{SECOND_CAMERA, assert_drives};
 use crate::support::{code, folder, json, json_file, message, program, stderr, stdout};
 
 const EXAMPLE: &str = "examples/groups_perception.c";
@@ -49,6 +49,7 @@ fn a_library_gets_images_and_radar_scans_and_has_the_same_bits_again() {
     let radars = ["--set", "sensors.rear-radar={ range-m = 300 }"];
     for library in faulty(folder.path()) {
         stdout(&run(&library, None, &images), 0);
+        stdout(&run(&library, None, &[&images[..], &["--set", SECOND_CAMERA]].concat()), 0);
         stdout(&run(&library, Some("needs-radars"), &radars), 0);
         let output = run(&library, Some("needs-radars"), &[]);
         assert_eq!(code(&output), 5, "{}", stderr(&output));

@@ -8,7 +8,10 @@ use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 use super::optics::{LensConfig, Optics};
 use super::picture::{FIELD_OF_VIEW_RAD, FOCAL_PX, Resolution, ResolutionConfig};
 use crate::kept::kept;
+use crate::sensor_name::{Named, checked_name};
 
+/// Name of the first rear camera if the scenario gives it none.
+const REAR_CAMERA_NAME: &str = "rear-camera";
 /// Horizontal field of view of the usual camera (deg), with which the networks were trained.
 const FIELD_OF_VIEW_DEG: f64 = 60.0;
 /// Largest angle from straight behind at which the image ends (deg): what stands beside the ego is
@@ -21,7 +24,7 @@ fn is_usual_field(number: &Num) -> bool {
     *number == Num::Fixed(FIELD_OF_VIEW_DEG)
 }
 
-fn is_straight_back(number: &Num) -> bool {
+fn is_zero(number: &Num) -> bool {
     *number == Num::Fixed(0.0)
 }
 
@@ -63,6 +66,10 @@ impl Default for SunConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct CameraConfig {
+    /// Name of the camera in faults, recordings and messages: lower-case letters, digits and
+    /// hyphens. Each of `additional-rear-cameras` needs one. Default: `rear-camera`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Processing of the image.
     pub pipeline: Choice<Pipeline>,
     /// ONNX file of another network for the pipeline `crop-classifier`, relative to the working
@@ -77,12 +84,15 @@ pub struct CameraConfig {
     pub mount_height_m: Num,
     /// Distance of the lens ahead of the ego's rear bumper (m).
     pub mount_from_rear_m: Num,
+    /// Distance of the lens from the ego's centre line to the left (m). Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub left_m: Num,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: Num,
     /// Yaw of the camera's axis from straight behind (deg), positive if it looks to the ego's left.
     /// All columns of the image look backward, at most 85° from straight behind: with a field of
     /// view of 60°, the yaw is -55 to 55. Default: 0.
-    #[serde(skip_serializing_if = "is_straight_back")]
+    #[serde(skip_serializing_if = "is_zero")]
     pub yaw_deg: Num,
     /// Horizontal field of view (deg) of all columns of the image. The networks that ship were
     /// trained with 60°. Default: 60.
@@ -116,11 +126,13 @@ pub struct CameraConfig {
 impl Default for CameraConfig {
     fn default() -> Self {
         Self {
+            name: None,
             pipeline: Choice::Fixed(Pipeline::CropClassifier),
             model: None,
             mask_rcnn: MaskRcnnConfig::default(),
             mount_height_m: Num::Fixed(1.2),
             mount_from_rear_m: Num::Fixed(0.6),
+            left_m: Num::Fixed(0.0),
             pitch_rad: Num::Fixed(0.03),
             yaw_deg: Num::Fixed(0.0),
             field_of_view_deg: Num::Fixed(FIELD_OF_VIEW_DEG),
@@ -148,6 +160,8 @@ pub struct Sun {
 /// The checked configuration of the rear camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
+    /// Name in faults, recordings and messages.
+    pub name: &'static str,
     /// Processing of the image.
     pub pipeline: Pipeline,
     /// ONNX file of another network for the crops.
@@ -158,6 +172,8 @@ pub struct Camera {
     pub mount_height_m: f64,
     /// Distance of the lens ahead of the ego's rear bumper (m).
     pub mount_from_rear_m: f64,
+    /// Distance of the lens from the ego's centre line to the left (m).
+    pub left_m: f64,
     /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: f64,
     /// Yaw of the optical axis from straight behind, positive if it looks to the ego's left (rad).
@@ -189,10 +205,41 @@ pub struct Camera {
     pub night_sky: f64,
 }
 
+impl Named for Camera {
+    const KIND: &'static str = "camera";
+
+    fn name(&self) -> &'static str {
+        self.name
+    }
+}
+
 impl Check for CameraConfig {
     type Checked = Camera;
 
     fn check(&self, parameters: &Parameters) -> Result<Camera, ConfigError> {
+        self.check_named(Some(REAR_CAMERA_NAME), parameters)
+    }
+}
+
+impl CameraConfig {
+    /// Checks the keys of a further camera, which needs a name, and lies under the sky of the first:
+    /// there is one.
+    pub(crate) fn check_further(&self, first: &Camera, parameters: &Parameters) -> Result<Camera, ConfigError> {
+        let usual = Self::default();
+        let own = [
+            (self.sun != usual.sun, "sun", "rear-camera.sun"),
+            (self.night_sky != usual.night_sky, "night-sky", "rear-camera.night-sky"),
+        ];
+        if let Some((_, key, other)) = own.into_iter().find(|(is_own, ..)| *is_own) {
+            let rule = "all cameras are under the same sky, which the first camera's keys give".to_owned();
+            return Err(ConfigError::new(key, Problem::Contradiction { other, rule }));
+        }
+        let camera = self.check_named(None, parameters)?;
+        Ok(Camera { sun: first.sun, night_sky: first.night_sky, ..camera })
+    }
+
+    /// Checks the keys of a camera that has this name if the scenario gives it none.
+    fn check_named(&self, default_name: Option<&'static str>, parameters: &Parameters) -> Result<Camera, ConfigError> {
         let number = |num, key, low, high| parameters.number(num, key, Range::closed(low, high));
         let half_turn = std::f64::consts::PI;
         let sun = |error: ConfigError| error.within("sun");
@@ -214,11 +261,13 @@ impl Check for CameraConfig {
             return Err(ConfigError::new("resolution", Problem::Contradiction { other: "pipeline", rule }));
         }
         Ok(Camera {
+            name: checked_name(self.name.as_ref(), default_name)?,
             pipeline,
             model: self.model.as_deref().map(kept),
             mask_rcnn: self.mask_rcnn.check(parameters).map_err(|error| error.within("mask-rcnn"))?,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", 0.4, 3.5)?,
             mount_from_rear_m: number(&self.mount_from_rear_m, "mount-from-rear-m", 0.0, 3.0)?,
+            left_m: number(&self.left_m, "left-m", -1.3, 1.3)?,
             pitch_rad: number(&self.pitch_rad, "pitch-rad", -0.2, 0.3)?,
             yaw_rad: yaw_deg.to_radians(),
             field_of_view_rad,

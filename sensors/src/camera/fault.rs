@@ -17,9 +17,11 @@ const DIRT_RGB: [f32; CHANNELS] = [70.0, 62.0, 52.0];
 /// arms.
 const BLOT_KEY: u64 = 0x0b10_7b10_7b10_70b1;
 
-/// The effects of faults of the rear camera at one instant. None by default.
+/// The effects of faults of a rear camera at one instant. None by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraFault {
+    /// Name of the camera; `None` if each has the fault.
+    pub sensor: Option<&'static str>,
     /// The camera delivers no image.
     pub is_dead: bool,
     /// The camera delivers its latest image again and again.

@@ -135,7 +135,8 @@ impl Frame {
         let yaw = scene.road.plane_pose(ego.s_m, ego.d_m, ego.heading_rad).yaw_rad;
         let light = Illumination::new(scene.environment, camera, ego, yaw);
         let (sin, cos) = maths::sin_cos(ego.heading_rad);
-        let (s_m, d_m) = (ego.s_m + lens.ahead_m * cos, ego.d_m + lens.ahead_m * sin);
+        let (s_m, d_m) =
+            (ego.s_m + lens.ahead_m * cos - lens.left_m * sin, ego.d_m + lens.ahead_m * sin + lens.left_m * cos);
         let drops = scene.time.ns() / DROP_PATTERN_PERIOD.ns();
         let mut frame = Self {
             lens,
@@ -161,7 +162,7 @@ impl Frame {
         let ego_clouds = spray::clouds_behind(
             &scene.ego,
             scene,
-            [-lens.ahead_m as f32, 0.0],
+            [-lens.ahead_m as f32, -lens.left_m as f32],
             [1.0, 0.0],
             lens.height_m as f32,
             key.0,

@@ -71,7 +71,7 @@ pub use network::Network;
 pub use optics::{LensConfig, Optics};
 pub use picture::{FOCAL_PX, HEIGHT_PX, PixelRect, Resolution, ResolutionConfig, WIDTH_PX};
 pub use pinhole::GroundBox;
-pub use pipeline::{CropClassifier, ImagedScene, MIN_SHARE_IN_IMAGE, fuse, is_beside_road};
+pub use pipeline::{CropClassifier, ImagedScene, MIN_SHARE_IN_IMAGE, best_camera, fuse, is_beside_road};
 pub use rear_camera::RearCamera;
 pub use sampling::{Sampling, SamplingError};
 pub use shapes::HELD_OUT_SHAPES;

@@ -68,6 +68,8 @@ pub(crate) struct Lens {
     /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind
     /// the centre.
     pub(crate) ahead_m: f64,
+    /// Position of the lens to the left of the ego's centre line (m).
+    pub(crate) left_m: f64,
     /// Height of the lens above the ground (m).
     pub(crate) height_m: f64,
     /// Sine of the downward pitch of the optical axis.
@@ -96,6 +98,7 @@ impl Lens {
             stated_focal_px: camera.focal_px,
             image: camera.resolution,
             ahead_m,
+            left_m: camera.left_m,
             height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
             sin_pitch: maths::sin(pitch),
             cos_pitch: maths::cos(pitch),
@@ -188,7 +191,7 @@ impl Lens {
         let (ego, other) = (pose(&scene.ego), pose(other));
         let (sin, cos) = maths::sin_cos(ego.yaw_rad);
         let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
-        ([cos * dx + sin * dy - self.ahead_m, cos * dy - sin * dx], other.yaw_rad - ego.yaw_rad)
+        ([cos * dx + sin * dy - self.ahead_m, cos * dy - sin * dx - self.left_m], other.yaw_rad - ego.yaw_rad)
     }
 
     /// Returns the smallest rectangle `[left, top, right, bottom]` (px) around the visible part of

@@ -122,6 +122,44 @@ impl RearCamera {
     }
 }
 
+/// How well a camera sees an object. The greater of two views is the better one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct View {
+    /// Whether the whole window is in the image.
+    is_whole: bool,
+    /// Number of pixels of the window in the image.
+    pixels: u64,
+}
+
+/// Returns the number of that camera which sees a detection best: it shows the whole window, or no
+/// camera does, and its window has the most pixels. A part of a vehicle can look like a vehicle of
+/// another class, and more pixels show more of the vehicle. Of equal cameras it is the first.
+/// Returns `None` if no camera shows enough of the window to classify it.
+pub fn best_camera<'a>(
+    cameras: impl IntoIterator<Item = (usize, &'a RearCamera)>,
+    ego: &SceneVehicle,
+    detection: &Detection,
+) -> Option<usize> {
+    let mut best: Option<(usize, View)> = None;
+    for (number, camera) in cameras {
+        let view = camera.detection_window(ego, detection).map(|window| View::of(window, camera));
+        if let Some(view) = view.filter(|view| best.is_none_or(|(_, other)| *view > other)) {
+            best = Some((number, view));
+        }
+    }
+    best.map(|(number, _)| number)
+}
+
+impl View {
+    fn of(window: PixelRect, camera: &RearCamera) -> Self {
+        let share = window.share_in_image(camera.camera().resolution);
+        let area = f64::from(window.width) * f64::from(window.height);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of some million pixels")]
+        let pixels = (share * area).round() as u64;
+        Self { is_whole: share >= 1.0, pixels }
+    }
+}
+
 /// Returns the box of a detection, which stands on the ground.
 pub(super) fn ground_box(detection: &Detection) -> GroundBox {
     let (x_m, y_m) = detection.centre_m();

@@ -39,7 +39,7 @@ impl RearCamera {
     /// Returns `None` if the box is not behind the ego vehicle or is too near to the lens.
     pub fn project(&self, ego: &SceneVehicle, object: &GroundBox) -> Option<PixelRect> {
         let lens = Lens::new(&self.camera, ego);
-        let relative_to_lens = GroundBox { x_m: object.x_m - lens.ahead_m, ..*object };
+        let relative_to_lens = GroundBox { x_m: object.x_m - lens.ahead_m, y_m: object.y_m - lens.left_m, ..*object };
         let corners = relative_to_lens.corners().map(|corner| lens.in_camera(corner));
         let nearest = corners.iter().map(|corner| corner[2]).fold(f64::INFINITY, f64::min);
         let farthest = corners.iter().map(|corner| corner[2]).fold(f64::NEG_INFINITY, f64::max);
@@ -274,6 +274,28 @@ mod tests {
                 let share = frame.instance_share(index);
                 assert!((0.1..0.9).contains(&share), "{:?}: {share}", other.vehicle.class);
             }
+        }
+    }
+
+    #[test]
+    fn a_camera_beside_the_centre_line_sees_what_it_would_see_in_an_ego_beside_its_place() {
+        let (_, environment, others) = varied_scene(Light::Night);
+        // The ego sprays from its own place.
+        let environment = Environment { rain_mm_per_h: 0.0, water_film_mm: 0.0, ..environment };
+        let road = Road::straight(3);
+        let picture = |camera: RearCamera, d_m: f64| {
+            let ego = vehicle(VehicleClass::Car, 500.0, d_m);
+            let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+            let window = camera.project(&ego, &box_of(&ego, &others[0])).unwrap();
+            (camera.render_image(&scene, ExposureKey(3)), window)
+        };
+        for left_m in [0.5, -1.25] {
+            let beside = camera_with(|config| config.left_m = Num::Fixed(left_m));
+            let (got, got_window) = picture(beside, -5.625);
+            let (wanted, wanted_window) = picture(rear_camera(), -5.625 + left_m);
+            assert!(got.image == wanted.image && got.instances == wanted.instances, "{left_m} m");
+            assert_eq!(got_window, wanted_window);
+            assert!(got.image != picture(rear_camera(), -5.625).0.image);
         }
     }
 

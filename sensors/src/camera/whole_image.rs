@@ -109,6 +109,7 @@ impl RearCamera {
         let lens = Lens::new(self.camera(), ego);
         let mut object = ground_box(detection);
         object.x_m -= lens.ahead_m;
+        object.y_m -= lens.left_m;
         let [left, top, right, bottom] = lens.bounds(&object.corners().map(|corner| lens.in_camera(corner)))?;
         let Resolution { width_px, height_px } = self.camera().resolution;
         let [width, height] = [width_px, height_px].map(f64::from);
@@ -123,7 +124,7 @@ impl RearCamera {
         (depth_m > 0.0).then_some(depth_m)
     }
 
-    /// Returns the distance to the ego's left of the ray through a column of the image (px), per
+    /// Returns the distance to the left of the lens of the ray through a column of the image (px), per
     /// distance behind the lens. The pitch is neglected.
     pub fn slope(&self, u: f64) -> f64 {
         let (slope, turn) = (self.slope_to_axis(u), maths::tan(self.camera().yaw_rad));
@@ -159,7 +160,7 @@ impl RearCamera {
         let below = -z / maths::hypot(x, y);
         (below > 1e-4).then(|| {
             let along = lens.height_m / -z;
-            ([lens.ahead_m + along * x, along * y], below)
+            ([lens.ahead_m + along * x, lens.left_m + along * y], below)
         })
     }
 }

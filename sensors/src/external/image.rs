@@ -1,9 +1,9 @@
-//! The images of the rear camera that a program gets.
+//! The images of the rear cameras that a program gets.
 
 use closecall_traffic::Time;
 
 use super::settings::ImageSettings;
-use crate::camera::{Camera, CameraFault, Frame, FrameBuffers, Sampling};
+use crate::camera::{Camera, CameraFault, Frame, FrameBuffers, Image, Sampling};
 use crate::exposures::Exposures;
 use crate::faults::FaultList;
 use crate::{NoiseKey, Scene};
@@ -11,6 +11,8 @@ use crate::{NoiseKey, Scene};
 /// An image as a program gets it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutsideImage {
+    /// Name of the camera.
+    pub camera: &'static str,
     /// Time of the exposure.
     pub time: Time,
     /// Number of columns.
@@ -21,11 +23,15 @@ pub struct OutsideImage {
     pub rgb: Vec<u8>,
 }
 
-/// The rear camera as a program is told of it, in the frame of the ego.
+/// A rear camera as a program is told of it, in the frame of the ego.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraMount {
-    /// Position of the lens ahead of the ego's centre (m). It is on the centre line.
+    /// Name of the camera.
+    pub name: &'static str,
+    /// Position of the lens ahead of the ego's centre (m).
     pub x_m: f64,
+    /// Position to the left of it (m).
+    pub y_m: f64,
     /// Height of the lens above the road (m).
     pub z_m: f64,
     /// Pitch, positive if it looks down (rad).
@@ -47,7 +53,9 @@ impl CameraMount {
     pub fn of(camera: &Camera, settings: ImageSettings, ego_length_m: f64) -> Self {
         let sampling = Sampling::every(settings.step, camera.resolution);
         Self {
+            name: camera.name,
             x_m: -0.5 * ego_length_m + camera.mount_from_rear_m,
+            y_m: camera.left_m,
             z_m: camera.mount_height_m,
             pitch_rad: camera.pitch_rad,
             yaw_rad: camera.yaw_rad,
@@ -59,7 +67,7 @@ impl CameraMount {
     }
 }
 
-/// The rear camera of a run whose images a program gets.
+/// A rear camera of a run whose images a program gets.
 pub(crate) struct OutsideCamera {
     camera: Camera,
     settings: ImageSettings,
@@ -70,13 +78,18 @@ pub(crate) struct OutsideCamera {
 }
 
 impl OutsideCamera {
-    /// Creates the camera of one run, whose exposure noise is keyed by `key`.
-    pub(crate) fn new(camera: Camera, settings: ImageSettings, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+    /// Creates the camera of one run with its number in the scenario. `key` is the key of its noise.
+    pub(crate) fn new(
+        (number, camera): (usize, &Camera),
+        settings: ImageSettings,
+        key: &NoiseKey,
+        faults: FaultList<CameraFault>,
+    ) -> Self {
         Self {
-            camera,
+            camera: *camera,
             settings,
             sampling: Sampling::every(settings.step, camera.resolution),
-            exposures: Exposures::new(key, faults),
+            exposures: Exposures::new((number, camera), key, faults),
             next: None,
             lists: FrameBuffers::default(),
         }
@@ -110,7 +123,8 @@ impl OutsideCamera {
         if let Some(fault) = &exposure.fault {
             fault.apply_to_picture(&mut picture, &self.sampling, self.camera.resolution);
         }
-        Some(OutsideImage { time: scene.time, width: picture.width, height: picture.height, rgb: picture.rgb })
+        let Image { width, height, rgb } = picture;
+        Some(OutsideImage { camera: self.camera.name, time: scene.time, width, height, rgb })
     }
 }
 
@@ -130,6 +144,7 @@ mod tests {
         };
         let usual = mount("");
         assert_eq!((usual.size_px, usual.yaw_rad), ([640, 400], 0.0));
+        assert_eq!((usual.name, usual.y_m, mount("left-m = 0.5").y_m), ("rear-camera", 0.0, 0.5));
         let other = mount("resolution = { width-px = 1921, height-px = 1208 }\nyaw-deg = -30");
         assert_eq!(other.size_px, [961, 604]);
         assert!((other.yaw_rad + std::f64::consts::FRAC_PI_6).abs() < 1e-12);

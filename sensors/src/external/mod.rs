@@ -66,10 +66,14 @@ pub struct PerceptionQuestion<'a> {
     /// The scans of the rear radars that have arrived since the last question, in the order of
     /// their times for each radar.
     pub radar_scans: &'a [OutsideRadarScan],
-    /// The image of the rear camera, if one is due and the program gets images.
+    /// The image of the first rear camera, if one is due and the program gets images.
     pub image: Option<&'a OutsideImage>,
-    /// The rear camera, if the program gets its images.
+    /// The images of the further rear cameras that are due.
+    pub additional_images: &'a [OutsideImage],
+    /// The first rear camera, if the program gets images.
     pub camera: Option<CameraMount>,
+    /// The further rear cameras, if the program gets images.
+    pub additional_cameras: &'a [CameraMount],
     /// The LiDARs that look back, in the order of the scenario.
     pub lidars: &'a [LidarMount],
     /// The rear radars: the left and the right one, or none.

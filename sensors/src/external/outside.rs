@@ -20,7 +20,8 @@ pub(crate) struct Outside {
     mounts: Vec<LidarMount>,
     radar: Option<RearRadar>,
     radar_mounts: Vec<RadarMount>,
-    camera: Option<OutsideCamera>,
+    /// The rear cameras, if the program gets images.
+    cameras: Vec<OutsideCamera>,
     latency_s: f64,
     /// The ego's state at the first question, which is the frame of all poses.
     first: Option<VehicleState>,
@@ -33,7 +34,7 @@ impl Outside {
     pub(crate) fn new(
         program: Box<dyn PerceptionProgram>,
         (lidars, radar): (Vec<Lidar>, Option<RearRadar>),
-        camera: Option<OutsideCamera>,
+        cameras: Vec<OutsideCamera>,
         latency_s: f64,
     ) -> Self {
         Self {
@@ -42,14 +43,14 @@ impl Outside {
             mounts: Vec::new(),
             radar,
             radar_mounts: Vec::new(),
-            camera,
+            cameras,
             latency_s,
             first: None,
             tracks: OutsideTracks::default(),
         }
     }
 
-    /// Asks the program about scans of the LiDARs and of the radars, and an image of the scene.
+    /// Asks the program about scans of the LiDARs and of the radars, and images of the scene.
     /// `believed` is the scene as the ego believes it to be.
     ///
     /// # Errors
@@ -65,13 +66,18 @@ impl Outside {
             self.mounts.extend(self.lidars.iter().map(|lidar| LidarMount::of(lidar, length_m)));
             self.radar_mounts.extend(self.radar.iter().flat_map(|radar| radar.mounts(length_m)));
         }
-        let image = self.camera.as_mut().and_then(|camera| camera.image(scene));
+        let mut images = self.cameras.iter_mut().map(|camera| camera.image(scene));
+        let (image, additional_images) = (images.next().flatten(), images.flatten().collect::<Vec<_>>());
+        let mut cameras = self.cameras.iter().map(|camera| camera.mount(length_m));
+        let (camera, additional_cameras) = (cameras.next(), cameras.collect::<Vec<_>>());
         self.program.perceive(&PerceptionQuestion {
             time: believed.time,
             scans,
             radar_scans,
             image: image.as_ref(),
-            camera: self.camera.as_ref().map(|camera| camera.mount(length_m)),
+            additional_images: &additional_images,
+            camera,
+            additional_cameras: &additional_cameras,
             lidars: &self.mounts,
             radars: &self.radar_mounts,
             ego: believed.ego.state,

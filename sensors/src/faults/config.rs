@@ -251,7 +251,7 @@ impl LidarFaultConfig {
     }
 }
 
-/// A fault of the rear camera. It holds from `from-s` to `until-s`, with all effects that it names.
+/// A fault of a rear camera. It holds from `from-s` to `until-s`, with all effects that it names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct CameraFaultConfig {
@@ -259,6 +259,8 @@ pub struct CameraFaultConfig {
     pub from_s: Option<Num>,
     /// Time at which the fault ends (s). Default: the end of the run.
     pub until_s: Option<Num>,
+    /// Name of the camera that has the fault. Default: each rear camera.
+    pub sensor: Option<String>,
     /// The camera delivers no image.
     pub dead: bool,
     /// The camera delivers its latest image again and again.
@@ -291,6 +293,7 @@ impl CameraFaultConfig {
     fn check(&self, parameters: &Parameters) -> Result<(CameraFault, [f64; 2]), ConfigError> {
         let number = |num: &Option<Num>, key, range| parameters.number_or(num.as_ref(), key, range, 0.0);
         let fault = CameraFault {
+            sensor: self.sensor.as_deref().map(kept),
             is_dead: self.dead,
             is_frozen: self.frozen,
             sun_glare: number(&self.sun_glare, "sun-glare", GLARE)?,
@@ -298,8 +301,8 @@ impl CameraFaultConfig {
             dirt: number(&self.dirt, "dirt", SHARE)?,
             blur_px: number(&self.blur_px, "blur-px", Range::closed(0.0, 50.0))?,
         };
-        let Self { from_s, until_s, .. } = self.clone();
-        if *self == (Self { from_s, until_s, ..Self::default() }) {
+        let Self { from_s, until_s, sensor, .. } = self.clone();
+        if *self == (Self { from_s, until_s, sensor, ..Self::default() }) {
             return Err(without_effect());
         }
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
@@ -309,6 +312,8 @@ impl CameraFaultConfig {
 impl Combine for CameraFault {
     fn and(self, other: Self) -> Self {
         Self {
+            // As for LiDARs, only entries of the same sensor are combined.
+            sensor: self.sensor.or(other.sensor),
             is_dead: self.is_dead || other.is_dead,
             is_frozen: self.is_frozen || other.is_frozen,
             sun_glare: self.sun_glare + other.sun_glare,

@@ -2,7 +2,7 @@
 
 use closecall_traffic::Side;
 
-use super::list::FaultList;
+use super::list::{Combine, FaultList};
 use super::{LidarFault, ObjectFault, OdometryErrors, RadarFault};
 use crate::camera::CameraFault;
 
@@ -50,13 +50,33 @@ impl Faults {
     }
 }
 
-impl FaultList<LidarFault> {
+/// The effects of faults of one of several sensors.
+pub(crate) trait OfSensor {
+    /// Returns the name of the sensor; `None` if each sensor has the fault.
+    fn sensor(&self) -> Option<&'static str>;
+}
+
+impl OfSensor for LidarFault {
+    fn sensor(&self) -> Option<&'static str> {
+        self.sensor
+    }
+}
+
+impl OfSensor for CameraFault {
+    fn sensor(&self) -> Option<&'static str> {
+        self.sensor
+    }
+}
+
+impl<T: Combine + OfSensor> FaultList<T> {
     /// Returns the entries of the sensor with this name: the entries that name it, and the entries
     /// that name no sensor.
     pub(crate) fn of_sensor(self, name: &str) -> Self {
-        self.only(|fault| fault.sensor.is_none_or(|sensor| sensor == name))
+        self.only(|fault| fault.sensor().is_none_or(|sensor| sensor == name))
     }
+}
 
+impl FaultList<LidarFault> {
     /// Returns the names of sensors that the entries have.
     pub(crate) fn sensors(&self) -> impl Iterator<Item = &'static str> + use<> {
         let names: Vec<&'static str> = self.spans().filter_map(|(fault, _)| fault.sensor).collect();

@@ -167,6 +167,10 @@ impl Effects for LidarFault {
 }
 
 impl Effects for CameraFault {
+    fn of_sensor(&self) -> Option<&'static str> {
+        self.sensor
+    }
+
     fn effects(&self) -> Vec<String> {
         those([
             (self.is_dead, "dead".to_owned()),

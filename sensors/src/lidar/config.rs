@@ -1,7 +1,7 @@
 //! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it
 //! becomes.
 
-use closecall_traffic::{ActorId, Check, Choice, ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use super::kind::NOMINAL_RANGE_M;
 use super::material::{DIRTY_PLATE, PLATE};
 use super::{ClusteringCheck, ClusteringModel, LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
-use crate::kept::kept;
+use crate::sensor_name::{Named, checked_name};
 
 /// The state of the registration plates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -255,7 +255,7 @@ impl LidarConfig {
         let kind = self.kind(parameters)?;
         let nominal = (self.nominal_range_m.as_ref(), NOMINAL_RANGE_M);
         Ok(Lidar {
-            name: self.checked_name(default_name)?,
+            name: checked_name(self.name.as_ref(), default_name)?,
             kind,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", Range::closed(0.2, 2.5))?,
             tilt_rad: number(&self.tilt_rad, "tilt-rad", Range::closed(-0.1, 0.1))?,
@@ -275,23 +275,6 @@ impl LidarConfig {
             clustering_check: None,
         })
     }
-
-    /// Returns the name of the sensor.
-    fn checked_name(&self, default_name: Option<&'static str>) -> Result<&'static str, ConfigError> {
-        match (&self.name, default_name) {
-            (Some(name), _) if ActorId::new(name).is_ok() => Ok(kept(name)),
-            (Some(name), _) => {
-                let rule =
-                    format!("`{name}` is no name: it needs lower-case letters, digits and hyphens, a letter first");
-                Err(ConfigError::new("name", Problem::Contradiction { other: "name", rule }))
-            }
-            (None, Some(name)) => Ok(name),
-            (None, None) => {
-                let needed = "each of several sensors needs a name, such as `name = \"left\"`";
-                Err(ConfigError::new("name", Problem::Missing { needed }))
-            }
-        }
-    }
 }
 
 impl Check for LidarConfig {
@@ -299,6 +282,14 @@ impl Check for LidarConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<Lidar, ConfigError> {
         self.check_named(Some(REAR_NAME), parameters)
+    }
+}
+
+impl Named for Lidar {
+    const KIND: &'static str = "LiDAR";
+
+    fn name(&self) -> &'static str {
+        self.name
     }
 }
 

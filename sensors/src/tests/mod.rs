@@ -6,6 +6,7 @@ mod front;
 mod long_vehicles;
 mod monitors;
 mod rear_radar;
+mod several_cameras;
 mod several_lidars;
 mod silhouettes;
 mod tracking;

@@ -32,6 +32,9 @@ pub(super) struct Hello {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) radars: Option<Vec<RadarMount>>,
     pub(super) camera: Option<Camera>,
+    /// Absent without further cameras, as in each question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) additional_cameras: Option<Vec<Camera>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -56,7 +59,9 @@ pub(super) struct Lidar {
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct Camera {
+    pub(super) name: String,
     pub(super) x_m: f64,
+    pub(super) y_m: f64,
     pub(super) z_m: f64,
     pub(super) pitch_rad: f64,
     pub(super) yaw_rad: f64,
@@ -78,6 +83,8 @@ pub(super) struct Scans {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) radar_scans: Option<Vec<RadarScan>>,
     pub(super) image: Option<Image>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) additional_images: Option<Vec<Image>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -124,6 +131,8 @@ pub(super) struct RadarDetection {
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct Image {
+    /// Name of the camera.
+    pub(super) camera: String,
     pub(super) time_ns: i64,
     pub(super) width: u32,
     pub(super) height: u32,

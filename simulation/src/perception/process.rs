@@ -142,8 +142,19 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
     let lidars: Vec<LidarMount> = model.rear_lidars().map(|lidar| LidarMount::of(&lidar, size.length_m)).collect();
     let radars: Vec<RadarMount> = model.rear_radar.iter().flat_map(|radar| radar.mounts(size.length_m)).collect();
     let latency_s = model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
-    let camera = program.images.map(|images| CameraMount::of(scenario.sensors.camera(), images, size.length_m));
-    let setup = Setup { size, road: &scenario.road, lidars: &lidars, radars: &radars, camera, latency_s };
+    let images = program.images.into_iter();
+    let cameras = images.flat_map(|images| scenario.sensors.rear_cameras().map(move |camera| (images, camera)));
+    let mut cameras = cameras.map(|(images, camera)| CameraMount::of(camera, images, size.length_m));
+    let (camera, additional) = (cameras.next(), cameras.collect::<Vec<_>>());
+    let setup = Setup {
+        size,
+        road: &scenario.road,
+        lidars: &lidars,
+        radars: &radars,
+        camera,
+        additional_cameras: &additional,
+        latency_s,
+    };
     let (child, identity, _) = greet(program, &setup).ok()?;
     let open_files = if program.kind == ProgramKind::Lib { Vec::new() } else { child.open_files() };
     Some((identity, open_files))

@@ -19,14 +19,15 @@ pub(super) struct Setup<'a> {
     pub(super) lidars: &'a [LidarMount],
     pub(super) radars: &'a [RadarMount],
     pub(super) camera: Option<CameraMount>,
+    pub(super) additional_cameras: &'a [CameraMount],
     pub(super) latency_s: f64,
 }
 
 impl<'a> Setup<'a> {
     /// Takes the content of the first message from a question.
     pub(super) fn of(question: &PerceptionQuestion<'a>) -> Self {
-        let PerceptionQuestion { size, road, lidars, radars, camera, latency_s, .. } = *question;
-        Self { size, road, lidars, radars, camera, latency_s }
+        let PerceptionQuestion { size, road, lidars, radars, camera, additional_cameras, latency_s, .. } = *question;
+        Self { size, road, lidars, radars, camera, additional_cameras, latency_s }
     }
 
     /// Returns the first message.
@@ -40,7 +41,8 @@ impl<'a> Setup<'a> {
             road: RoadMessage::of(self.road),
             lidars: self.lidars.iter().map(lidar_message).collect(),
             radars: (!self.radars.is_empty()).then(|| self.radars.to_vec()),
-            camera: self.camera.map(camera_message),
+            camera: self.camera.as_ref().map(camera_message),
+            additional_cameras: several(self.additional_cameras, self.additional_cameras, camera_message),
         })))
     }
 }
@@ -64,6 +66,7 @@ pub(super) fn scans(question: &PerceptionQuestion<'_>) -> Vec<u8> {
         radar_scans: (!question.radars.is_empty())
             .then(|| question.radar_scans.iter().map(radar_scan_message).collect()),
         image: question.image.map(image_message),
+        additional_images: several(question.additional_cameras, question.additional_images, image_message),
     })))
 }
 
@@ -81,15 +84,20 @@ fn radar_scan_message(scan: &OutsideRadarScan) -> RadarScan {
     RadarScan { side: scan.side, time_ns: scan.time.ns(), detections: scan.detections.iter().map(message).collect() }
 }
 
-fn camera_message(camera: CameraMount) -> Camera {
-    let CameraMount { x_m, z_m, pitch_rad, yaw_rad, focal_px, distortion, size_px: [width, height], period_s } = camera;
-    let [distortion_k1, distortion_k2] = distortion;
-    Camera { x_m, z_m, pitch_rad, yaw_rad, focal_px, distortion_k1, distortion_k2, width, height, period_s }
+/// Returns the messages of what concerns further cameras; `None` without such cameras.
+fn several<T, M>(cameras: &[CameraMount], all: &[T], message: impl Fn(&T) -> M) -> Option<Vec<M>> {
+    (!cameras.is_empty()).then(|| all.iter().map(message).collect())
+}
+
+fn camera_message(camera: &CameraMount) -> Camera {
+    let CameraMount { name, x_m, y_m, z_m, pitch_rad, yaw_rad, focal_px, distortion, size_px, period_s } = *camera;
+    let ([distortion_k1, distortion_k2], [width, height], name) = (distortion, size_px, name.to_owned());
+    Camera { name, x_m, y_m, z_m, pitch_rad, yaw_rad, focal_px, distortion_k1, distortion_k2, width, height, period_s }
 }
 
 fn image_message(image: &OutsideImage) -> Image {
-    let OutsideImage { time, width, height, ref rgb } = *image;
-    Image { time_ns: time.ns(), width, height, rgb: STANDARD.encode(rgb) }
+    let OutsideImage { camera, time, width, height, ref rgb } = *image;
+    Image { camera: camera.to_owned(), time_ns: time.ns(), width, height, rgb: STANDARD.encode(rgb) }
 }
 
 fn scan_message(outside: &OutsideScan) -> Scan {

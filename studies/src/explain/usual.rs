@@ -108,16 +108,15 @@ pub(super) fn unusual(stage: Stage, case: &Case, scenario: &Scenario) -> Option<
         Stage::Class => {
             let faults = &case.file.config().fault;
             let object = case.sensors() == SensorMode::Object;
+            let has_other_camera = config.rear_camera != SensorsConfig::default().rear_camera
+                || !config.additional_rear_cameras.is_empty();
             first(&[
                 (faults.class_background, "every vehicle is classified as background"),
                 (
                     object && config.rear_object.class_confidence.is_some(),
                     "the class confidence is not the shipped one",
                 ),
-                (
-                    !object && config.rear_camera != SensorsConfig::default().rear_camera,
-                    "the rear camera is not the shipped one",
-                ),
+                (!object && has_other_camera, "the rear camera is not the shipped one"),
             ])
         }
         Stage::Tracks => {

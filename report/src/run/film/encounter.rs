@@ -43,7 +43,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         happenings: Vec::new(),
         notes: notes(encounter),
         acceleration_limits: Vec::new(),
-        camera: None,
+        cameras: Vec::new(),
         outcome: None,
         avoidable: Vec::new(),
         letters: VehicleLetters::default(),

@@ -113,15 +113,20 @@ pub struct Frame {
     /// Detections of the left and of the right rear radar, in the frames with a new scan; none
     /// below [`Level::Objects`].
     pub(in crate::run) radar_returns: Option<[Vec<RadarReturn>; 2]>,
-    /// Image of the rear camera that a network has evaluated as a whole, in the frames in which one
-    /// was taken; none below [`Level::Full`].
-    pub(in crate::run) rear_image: Option<RearImage>,
+    /// Images of rear cameras that a network has evaluated as a whole, in the frames in which they
+    /// were taken; none below [`Level::Full`].
+    pub(in crate::run) rear_images: Vec<RearImage>,
 }
 
 impl Frame {
     /// Returns the index of the vehicle ahead of the ego in its lane.
     pub(in crate::run) fn lead(&self) -> Option<usize> {
         self.margins.lead.ok().map(|lead| lead.actor)
+    }
+
+    /// Returns the image of a rear camera, if one was taken that a network has evaluated as a whole.
+    pub(in crate::run) fn rear_image(&self, camera: &Camera) -> Option<&RearImage> {
+        self.rear_images.iter().find(|image| image.camera == camera.name)
     }
 
     /// Returns the index of the vehicle behind the ego in its lane.
@@ -162,8 +167,9 @@ pub struct Film {
     pub(in crate::run) notes: Vec<(Time, String)>,
     /// Reference levels of the ego's acceleration (m/s²).
     pub(in crate::run) acceleration_limits: Vec<Limit>,
-    /// The rear camera and the key of its noise, if one was simulated.
-    pub(in crate::run) camera: Option<(Camera, NoiseKey)>,
+    /// The rear cameras in the order of the scenario, each with the key of its noise, if they were
+    /// simulated.
+    pub(in crate::run) cameras: Vec<(Camera, NoiseKey)>,
     /// The outcome; `None` for recorded traffic.
     pub(in crate::run) outcome: Option<Outcome>,
     /// How each collision of the outcome was avoidable, in its order; `None` if undetermined.

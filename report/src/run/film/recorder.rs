@@ -1,7 +1,6 @@
 //! The observer that records the film of a run.
 
 use closecall_controllers::{CheckedDriver, EgoSettings};
-use closecall_sensors::camera::Pipeline;
 use closecall_sensors::lidar::RearLidar;
 use closecall_sensors::{Detection, NoiseKey, RadarReturn, SensorMode};
 use closecall_studies::attribution::Motion;
@@ -64,7 +63,8 @@ impl FilmRecorder {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
         };
-        let has_camera = sensors.mode() == SensorMode::Full && sensors.camera().pipeline != Pipeline::Off;
+        let actors = scenario.actors.iter().map(|actor| actor.id.clone()).collect();
+        let noise_key = NoiseKey { seed: key.seed, sample: key.sample, ego: scenario.ego_id().clone(), actors };
         let film_actor = |(index, actor): (usize, &closecall_scenarios::Actor)| FilmActor {
             name: actor.id.to_string(),
             vehicle: scenario.vehicle(index, key),
@@ -86,11 +86,10 @@ impl FilmRecorder {
             happenings: Vec::new(),
             notes: Vec::new(),
             acceleration_limits: limits(scenario, arm),
-            camera: (has_camera && level == Level::Full).then(|| {
-                let ego = scenario.ego_id().clone();
-                let actors = scenario.actors.iter().map(|actor| actor.id.clone()).collect();
-                (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego, actors })
-            }),
+            cameras: match sensors.mode() == SensorMode::Full && level == Level::Full {
+                true => sensors.rear_cameras().map(|camera| (*camera, noise_key.clone())).collect(),
+                false => Vec::new(),
+            },
             outcome: None,
             avoidable: Vec::new(),
             letters: VehicleLetters::of(scenario),
@@ -233,7 +232,13 @@ impl Observer for FilmRecorder {
             radar_returns: radars
                 .filter(|radars| keeps_objects && radars.time == Some(view.time))
                 .map(|radars| radars.returns.map(<[RadarReturn]>::to_vec)),
-            rear_image: view.perception.rear_image().filter(|image| keeps_images && image.time == view.time).cloned(),
+            rear_images: match keeps_images {
+                true => {
+                    let images = view.perception.rear_images().into_iter();
+                    images.filter(|image| image.time == view.time).cloned().collect()
+                }
+                false => Vec::new(),
+            },
         });
     }
 

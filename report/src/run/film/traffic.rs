@@ -99,7 +99,7 @@ pub fn film_lane_change(
         happenings: Vec::new(),
         notes: notes(change),
         acceleration_limits: Vec::new(),
-        camera: None,
+        cameras: Vec::new(),
         outcome: None,
         avoidable: Vec::new(),
         letters: VehicleLetters::default(),
@@ -272,7 +272,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         other_scans: Vec::new(),
         radar_health: None,
         radar_returns: None,
-        rear_image: None,
+        rear_images: Vec::new(),
         scan: None,
     }
 }

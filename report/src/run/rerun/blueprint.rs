@@ -27,6 +27,7 @@ use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 pub(super) use self::nodes::BLUEPRINT_TIMELINE;
 use self::nodes::{Node, View, below, beside, named, tabs};
 use super::RecordingError;
+use super::camera::{Pictures, STRIP_PX};
 use super::palette;
 use super::parts::{
     Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
@@ -56,8 +57,8 @@ pub(super) struct FilmContents {
     pub(super) sky: palette::Rgba,
     /// Lowest and highest position across the road in the view from above (m in the picture).
     pub(super) bird_range: [f64; 2],
-    /// Size of the pictures of the camera (px); `None` if there are none.
-    pub(super) camera_px: Option<[f64; 2]>,
+    /// The pictures of the rear cameras.
+    pub(super) cameras: Vec<Pictures>,
     /// True if there are states of the ego stack.
     pub(super) has_states: bool,
     /// The plots that have a curve.
@@ -70,7 +71,7 @@ pub(super) struct FilmContents {
 
 /// Writes the layout for these films. `verdict_text` is the text of the verdict.
 pub(super) fn write(recording: &Recording, films: &[FilmContents], verdict_text: &str) -> Result<(), RecordingError> {
-    let has_camera = films.iter().any(|film| film.camera_px.is_some());
+    let has_camera = films.iter().any(|film| !film.cameras.is_empty());
     let views: Vec<(f32, Node)> = bird(films)
         .map(|view| (bird_share(films), view))
         .into_iter()
@@ -107,7 +108,7 @@ fn bird_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
         [_] => 3.0,
-        _ if films.iter().any(|film| film.camera_px.is_some()) => 5.0 * higher,
+        _ if films.iter().any(|film| !film.cameras.is_empty()) => 5.0 * higher,
         _ => 4.6 * higher,
     }
 }
@@ -150,10 +151,13 @@ fn verdict() -> Node {
 }
 
 /// Returns the 3D views of the films with the images of the rear cameras. The views of one film lie
-/// below each other, and the views of a pair are tabs.
+/// below each other, and the views of a pair are tabs. Several cameras of one film are tabs.
 fn scenes(films: &[FilmContents]) -> Option<Node> {
     let scenes: Vec<(f32, Node)> = films.iter().filter(|film| film.has_scene).map(|film| (1.0, scene(film))).collect();
-    let camera_of = |film: &FilmContents| Some((1.0, camera(titled("Rear camera", films, film), film)?));
+    let camera_of = |film: &FilmContents| {
+        let view = |pictures: &Pictures| camera(titled(&pictures.title, films, film), (film, pictures));
+        tabs(film.cameras.iter().map(view).collect()).map(|node| (1.0, node))
+    };
     let cameras: Vec<(f32, Node)> = films.iter().filter_map(camera_of).collect();
     match (scenes.len(), cameras.is_empty()) {
         (_, true) => beside(scenes),
@@ -170,12 +174,12 @@ fn scenes(films: &[FilmContents]) -> Option<Node> {
 
 /// Returns the view of the pictures of a rear camera, with the strip above them that has the
 /// labels.
-fn camera(title: String, film: &FilmContents) -> Option<Node> {
-    let [width_px, height_px] = film.camera_px?;
-    let bounds = Range2D { x_range: [0.0, width_px].into(), y_range: [-super::camera::STRIP_PX, height_px].into() };
+fn camera(title: String, (film, pictures): (&FilmContents, &Pictures)) -> Node {
+    let [width_px, height_px] = pictures.size_px;
+    let bounds = Range2D { x_range: [0.0, width_px].into(), y_range: [-STRIP_PX, height_px].into() };
     let strip = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
-    let view = View::new("2D", title, format!("{}{}", film.root, super::camera::ENTITY));
-    Some(view.with("VisualBounds2D", VisualBounds2D::new(bounds)).with("Background", strip).into())
+    let view = View::new("2D", title, format!("{}{}", film.root, pictures.entity));
+    view.with("VisualBounds2D", VisualBounds2D::new(bounds)).with("Background", strip).into()
 }
 
 /// Returns the 3D view of a film, which moves along the road with the ego.

@@ -1,4 +1,4 @@
-//! Images of the rear camera with the results of its network: the windows that the crop classifier
+//! Images of the rear cameras with the results of their networks: the windows that the crop classifier
 //! evaluates, or the instances of the Mask R-CNN.
 //!
 //! The closed loop never renders a whole camera image. This module renders it afterwards, from the
@@ -36,11 +36,22 @@ const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time:
 /// in any case.
 const LEAST_INTERVAL: Time = Time::from_ms(2_500);
 
-/// Entity of the camera, which moves with the ego.
-pub(super) const ENTITY: &str = "world/ego/camera";
+/// Entity of the first camera, which moves with the ego.
+const ENTITY: &str = "world/ego/camera";
 /// Distance at which the scene shows the image behind the camera (m). It is near, so the image
 /// hides no vehicle.
 const IMAGE_DISTANCE_M: f32 = 1.2;
+
+/// The pictures of a camera in a recording.
+#[derive(Clone, Debug)]
+pub(super) struct Pictures {
+    /// Title of their view.
+    pub(super) title: String,
+    /// Their entity.
+    pub(super) entity: String,
+    /// Their size (px).
+    pub(super) size_px: [f64; 2],
+}
 
 /// The part of the image that a recording shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -78,11 +89,11 @@ impl Shown {
 
 /// Writes position and projection of the camera, so that the scene shows its image where it is
 /// taken. The pitch of the body is left out.
-fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
+fn write_pinhole(writer: &Writer<'_>, film: &Film, (entity, camera): (&str, &Camera)) -> Result<(), RecordingError> {
     let ahead_m = camera.mount_from_rear_m - 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let axes = axes(camera).map(|axis| axis.map(|value| value as f32));
-    let position_m = [ahead_m as f32, 0.0, camera.mount_height_m as f32];
-    writer.write_static(ENTITY, &Transform3D::from_translation_mat3x3(position_m, axes))?;
+    let position_m = [ahead_m as f32, camera.left_m as f32, camera.mount_height_m as f32];
+    writer.write_static(entity, &Transform3D::from_translation_mat3x3(position_m, axes))?;
     let Shown { image, step_px, rows_px } = Shown::of(camera.resolution);
     let (step, first_row) = (f32::from(step_px), f32::from(rows_px.start));
     let rows = f32::from(rows_px.end) - first_row;
@@ -91,7 +102,7 @@ fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<()
     let pinhole = Pinhole::from_focal_length_and_resolution([focal, focal], [width / step, rows / step])
         .with_principal_point([0.5 * width / step, (0.5 * height - first_row) / step])
         .with_image_plane_distance(IMAGE_DISTANCE_M);
-    writer.write_static(ENTITY, &pinhole)
+    writer.write_static(entity, &pinhole)
 }
 
 /// Returns the axes of the camera in the ego frame: right, down, and the optical axis, which points
@@ -106,44 +117,63 @@ fn axes(camera: &Camera) -> [[f64; 3]; 3] {
     ]
 }
 
-/// Writes the images. Returns the size of the shown pictures (px), or `None` if there are none.
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Option<[f64; 2]>, RecordingError> {
-    let Some((camera, key)) = &film.camera else { return Ok(None) };
-    write_pinhole(writer, film, camera)?;
+/// Writes the images of all cameras whose images a network gets. Returns the pictures of each
+/// camera that has any.
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<Pictures>, RecordingError> {
+    let mut written = Vec::new();
+    for number in 0..film.cameras.len() {
+        if film.cameras[number].0.pipeline != Pipeline::Off {
+            written.extend(write_camera(writer, film, number)?);
+        }
+    }
+    Ok(written)
+}
+
+/// Writes the images of the camera with this number in the scenario.
+fn write_camera(writer: &Writer<'_>, film: &Film, number: usize) -> Result<Option<Pictures>, RecordingError> {
+    let (camera, key) = &film.cameras[number];
+    let (title, entity) = match number {
+        0 => ("Rear camera".to_owned(), ENTITY.to_owned()),
+        _ => (format!("Rear camera {}", camera.name), format!("{ENTITY}s/{}", camera.name)),
+    };
+    write_pinhole(writer, film, (&entity, camera))?;
+    let exposures = rear_exposures(key, (number, camera));
     let camera = RearCamera::new(*camera);
     let is_whole = camera.camera().pipeline == Pipeline::MaskRcnn;
     let part = Shown::of(camera.camera().resolution);
-    let windows_entity = format!("{ENTITY}/windows");
-    writer.write_static(LABELS_ENTITY, &fixed_labels())?;
+    let windows_entity = format!("{entity}/windows");
+    let labels_entity = labels_entity(&entity);
+    writer.write_static(&labels_entity, &fixed_labels())?;
     if is_whole {
-        instances::write_fixed(writer)?;
+        instances::write_fixed(writer, &entity)?;
     } else {
         writer.write_static(&windows_entity, &fixed_marks())?;
     }
     let mut lists = FrameBuffers::default();
     let (mut images, mut marks) = (Vec::new(), Vec::new());
-    let keyed: Vec<(&Frame, ExposureKey)> = film.frames.iter().zip(rear_exposures(key)).collect();
-    let shown = frames_to_show(film, is_whole);
+    let keyed: Vec<(&Frame, ExposureKey)> = film.frames.iter().zip(exposures).collect();
+    let shown = frames_to_show(film, camera.camera());
     for &row in &shown {
         let image;
-        (image, lists) = render(film, &camera, keyed[shown_row(film, row)], lists);
+        (image, lists) = render(film, &camera, keyed[shown_row(film, camera.camera(), row)], lists);
         images.push((film.frames[row].time, image));
     }
     let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
-    writer.write_each(ENTITY, &images)?;
+    writer.write_each(&entity, &images)?;
     if is_whole {
-        instances::write(writer, &part, shown.iter().map(|row| &film.frames[*row]))?;
+        let taken = shown.iter().filter_map(|row| film.frames[*row].rear_image(camera.camera()));
+        instances::write(writer, (&entity, &part), taken)?;
     } else {
         marks.extend(shown.iter().map(|row| {
             let frame = &film.frames[*row];
-            (frame.time, windows::windows(film, &camera, frame))
+            (frame.time, windows::windows(film, number, frame))
         }));
         let boxes: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, marks)| (*time, &marks.0 as _)).collect();
         writer.write_each(&windows_entity, &boxes)?;
         let labels: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, marks)| (*time, &marks.1 as _)).collect();
-        writer.write_each(LABELS_ENTITY, &labels)?;
+        writer.write_each(&labels_entity, &labels)?;
     }
-    Ok((!images.is_empty()).then(|| part.size_px()))
+    Ok((!images.is_empty()).then(|| Pictures { title, entity, size_px: part.size_px() }))
 }
 
 /// Returns what all boxes in the image have in common. Their own labels would be broken at the
@@ -179,18 +209,19 @@ fn label_px(label: &str) -> f32 {
 
 /// Returns the row of the frame that the image taken in a row shows: an earlier one if the camera
 /// is frozen.
-fn shown_row(film: &Film, row: usize) -> usize {
-    let time = film.frames[row].rear_image.as_ref().map_or(film.frames[row].time, |image| image.shown_time);
+fn shown_row(film: &Film, camera: &Camera, row: usize) -> usize {
+    let time = film.frames[row].rear_image(camera).map_or(film.frames[row].time, |image| image.shown_time);
     film.frames[..row].partition_point(|frame| frame.time < time)
 }
 
 /// Returns the rows of the frames whose images are shown: for each selected instant, the latest
 /// frame with a scan or, if the network reads whole images, with an image.
-fn frames_to_show(film: &Film, is_whole: bool) -> Vec<usize> {
+fn frames_to_show(film: &Film, camera: &Camera) -> Vec<usize> {
+    let is_whole = camera.pipeline == Pipeline::MaskRcnn;
     let critical = film.critical_moment();
     let instants =
         TIMES_BEFORE.iter().map(|&before| critical - before).chain(film.moments().iter().map(|noted| noted.time));
-    let has_marks = |frame: &Frame| if is_whole { frame.rear_image.is_some() } else { frame.scan.is_some() };
+    let has_marks = |frame: &Frame| if is_whole { frame.rear_image(camera).is_some() } else { frame.scan.is_some() };
     let rows: Vec<usize> = (0..film.frames.len()).filter(|&row| has_marks(&film.frames[row])).collect();
     let latest = |time: Time| rows.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
     let mut selected: Vec<usize> = instants.filter_map(latest).chain(rows.first().copied()).collect();
@@ -238,8 +269,11 @@ fn in_picture(shown: &Shown, [left, top, right, bottom]: [f32; 4]) -> ([f32; 2],
     (low, [0, 1].map(|axis| high[axis] - low[axis]))
 }
 
-/// Entity of the labels of the boxes.
-const LABELS_ENTITY: &str = "world/ego/camera/labels";
+/// Returns the entity of the labels of the boxes in the images of a camera.
+fn labels_entity(entity: &str) -> String {
+    format!("{entity}/labels")
+}
+
 /// Height of the strip above the picture in which the labels of the boxes lie (px of the picture):
 /// a label in a window of 1280 x 720 px. On the strip, which is black, labels are legible.
 pub(super) const STRIP_PX: f64 = 16.0;

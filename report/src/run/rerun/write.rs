@@ -152,7 +152,7 @@ fn write_film(
         radars::write(writer, film)?;
         bird::write(writer, canvas)?;
         contents.has_scene = true;
-        contents.camera_px = camera::write(writer, film)?;
+        contents.cameras = camera::write(writer, film)?;
     }
     contents.plots = plots::write(writer, film, role)?;
     contents.has_states = film.frames.iter().any(|frame| frame.command.is_some());

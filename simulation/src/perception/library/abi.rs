@@ -40,7 +40,7 @@ pub(super) struct Radar {
     pub(super) radial_sd_mps: f64,
 }
 
-/// The rear camera.
+/// A rear camera.
 #[repr(C)]
 pub(super) struct Camera {
     pub(super) x_m: f64,
@@ -53,6 +53,8 @@ pub(super) struct Camera {
     pub(super) period_s: f64,
     pub(super) width: u32,
     pub(super) height: u32,
+    pub(super) y_m: f64,
+    pub(super) name: *const c_char,
 }
 
 /// The data that a perception receives when it is created.
@@ -72,6 +74,8 @@ pub(super) struct SetupView {
     pub(super) radars: *const Radar,
     pub(super) radar_count: u64,
     pub(super) camera: *const Camera,
+    pub(super) additional_cameras: *const Camera,
+    pub(super) additional_camera_count: u64,
 }
 
 /// A scan of a LiDAR.
@@ -101,13 +105,16 @@ pub(super) struct RadarScan {
     pub(super) detections: *const RadarDetection,
 }
 
-/// An image of the rear camera.
+/// An image of a rear camera.
 #[repr(C)]
 pub(super) struct Image {
     pub(super) time_ns: i64,
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) rgb: *const u8,
+    /// Index in the additional cameras; 0 for the image of the first camera, too.
+    pub(super) additional_camera: u32,
+    pub(super) reserved: u32,
 }
 
 /// The question of one control step.
@@ -129,6 +136,8 @@ pub(super) struct InputView {
     pub(super) radar_scans: *const RadarScan,
     pub(super) radar_scan_count: u64,
     pub(super) image: *const Image,
+    pub(super) additional_images: *const Image,
+    pub(super) additional_image_count: u64,
 }
 
 /// A box for the built-in tracker.
@@ -195,13 +204,13 @@ pub(super) type TextFunction = unsafe extern "C-unwind" fn() -> *const c_char;
 const _: () = {
     assert!(size_of::<Lidar>() == 72);
     assert!(size_of::<Radar>() == 80);
-    assert!(size_of::<Camera>() == 72);
-    assert!(size_of::<SetupView>() == 104);
+    assert!(size_of::<Camera>() == 88);
+    assert!(size_of::<SetupView>() == 120);
     assert!(size_of::<Scan>() == 80);
     assert!(size_of::<RadarDetection>() == 24);
     assert!(size_of::<RadarScan>() == 32);
-    assert!(size_of::<Image>() == 24);
-    assert!(size_of::<InputView>() == 120);
+    assert!(size_of::<Image>() == 32);
+    assert!(size_of::<InputView>() == 136);
     assert!(size_of::<Detection>() == 136);
     assert!(size_of::<Track>() == 232);
     assert!(size_of::<AnswerView>() == 32);

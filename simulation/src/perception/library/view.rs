@@ -7,25 +7,31 @@ use closecall_sensors::lidar::MirrorSide;
 use closecall_traffic::Side;
 
 use super::abi;
-use crate::perception::message::{Hello, Lidar, Points, Scans};
+use crate::perception::message::{Camera, Hello, Image, Lidar, Points, Scans};
 
 /// The data that a perception receives when it is created.
 pub(super) struct Setup {
     hello: Hello,
     names: Vec<CString>,
+    /// The names of the first rear camera and of the further ones.
+    camera_names: Vec<CString>,
 }
 
 impl Setup {
     /// Returns the setup that a greeting states.
     pub(super) fn new(hello: Hello) -> Self {
         // A name of the scenario has no NUL character.
-        let names = hello.lidars.iter().map(|lidar| CString::new(lidar.name.as_str()).unwrap_or_default()).collect();
-        Self { hello, names }
+        let text = |name: &str| CString::new(name).unwrap_or_default();
+        let names = hello.lidars.iter().map(|lidar| text(&lidar.name)).collect();
+        let cameras = hello.camera.iter().chain(hello.additional_cameras.iter().flatten());
+        let camera_names = cameras.map(|camera| text(&camera.name)).collect();
+        Self { hello, names, camera_names }
     }
 
     /// Calls `f` with the setup in the form of the interface.
     pub(super) fn with_view<T>(&self, f: impl FnOnce(&abi::SetupView) -> T) -> T {
-        let Hello { control_step_s, latency_s, ego, road, lidars, radars, camera, .. } = &self.hello;
+        let Hello { control_step_s, latency_s, ego, road, lidars, radars, camera, additional_cameras, .. } =
+            &self.hello;
         let lidar = |(lidar, name): (&Lidar, &CString)| abi::Lidar {
             name: name.as_ptr(),
             x_m: lidar.x_m,
@@ -53,7 +59,7 @@ impl Setup {
         };
         let lidar_list: Vec<abi::Lidar> = lidars.iter().zip(&self.names).map(lidar).collect();
         let radar_list: Vec<abi::Radar> = radars.iter().flatten().map(radar).collect();
-        let camera_view = camera.as_ref().map(|camera| abi::Camera {
+        let camera_view = |(camera, name): (&Camera, &CString)| abi::Camera {
             x_m: camera.x_m,
             z_m: camera.z_m,
             pitch_rad: camera.pitch_rad,
@@ -64,7 +70,12 @@ impl Setup {
             period_s: camera.period_s,
             width: whole(camera.width),
             height: whole(camera.height),
-        });
+            y_m: camera.y_m,
+            name: name.as_ptr(),
+        };
+        let all = camera.iter().chain(additional_cameras.iter().flatten()).zip(&self.camera_names);
+        let cameras: Vec<abi::Camera> = all.map(camera_view).collect();
+        let additional = cameras.get(1..).unwrap_or_default();
         f(&abi::SetupView {
             control_step_s: *control_step_s,
             latency_s: *latency_s,
@@ -79,7 +90,9 @@ impl Setup {
             lidar_count: lidar_list.len() as u64,
             radars: radar_list.as_ptr(),
             radar_count: radar_list.len() as u64,
-            camera: camera_view.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
+            camera: cameras.first().map_or(std::ptr::null(), std::ptr::from_ref),
+            additional_cameras: additional.as_ptr(),
+            additional_camera_count: additional.len() as u64,
         })
     }
 
@@ -131,13 +144,21 @@ pub(super) fn with_input<T>(
             detections: scan.detections.as_ptr(),
         })
         .collect();
-    let rgb = question.image.as_ref().map(|image| image.decode()).transpose()?;
-    let image = question.image.as_ref().zip(rgb.as_ref()).map(|(image, rgb)| abi::Image {
+    let additional_cameras = setup.hello.additional_cameras.as_deref().unwrap_or_default();
+    let view_of = |image: &Image, rgb: &[u8]| abi::Image {
         time_ns: image.time_ns,
         width: image.width,
         height: image.height,
         rgb: rgb.as_ptr(),
-    });
+        additional_camera: whole(additional_cameras.iter().position(|one| one.name == image.camera).unwrap_or(0)),
+        reserved: 0,
+    };
+    let rgb = question.image.as_ref().map(Image::decode).transpose()?;
+    let image = question.image.as_ref().zip(rgb.as_ref()).map(|(image, rgb)| view_of(image, rgb));
+    let additional = question.additional_images.as_deref().unwrap_or_default();
+    let additional_rgb: Vec<Vec<u8>> = additional.iter().map(Image::decode).collect::<Result<_, _>>()?;
+    let additional_images: Vec<abi::Image> =
+        additional.iter().zip(&additional_rgb).map(|(image, rgb)| view_of(image, rgb)).collect();
     let (odometry, pose) = (&question.odometry, &question.pose);
     Ok(f(&abi::InputView {
         time_ns: question.time_ns,
@@ -156,6 +177,8 @@ pub(super) fn with_input<T>(
         radar_scans: radar_scans.as_ptr(),
         radar_scan_count: radar_scans.len() as u64,
         image: image.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
+        additional_images: additional_images.as_ptr(),
+        additional_image_count: additional_images.len() as u64,
     }))
 }
 

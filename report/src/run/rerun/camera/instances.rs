@@ -1,10 +1,10 @@
 //! The instances that the Mask R-CNN found in an image: boxes with class and score, and masks.
 
+use closecall_sensors::RearImage;
 use closecall_sensors::camera::{Instance, MASK_THRESHOLD};
 use closecall_traffic::{Time, VehicleClass};
 
-use super::{ENTITY, LABELS_ENTITY, Shown, class_colour, clear_covered, fixed_marks, in_picture, labels_in_strip};
-use crate::run::film::Frame;
+use super::{Shown, class_colour, clear_covered, fixed_marks, in_picture, labels_entity, labels_in_strip};
 use crate::run::rerun::RecordingError;
 use crate::run::rerun::palette::{self, Rgba};
 use crate::run::rerun::stream::Writer;
@@ -17,41 +17,40 @@ const LIKELY: f64 = 0.5;
 /// Opacity of the masks (0 to 1), which leaves the vehicles visible.
 const MASK_OPACITY: f32 = 0.4;
 
-fn boxes_entity() -> String {
-    format!("{ENTITY}/instances")
+fn boxes_entity(entity: &str) -> String {
+    format!("{entity}/instances")
 }
 
-fn masks_entity() -> String {
-    format!("{ENTITY}/masks")
+fn masks_entity(entity: &str) -> String {
+    format!("{entity}/masks")
 }
 
 /// Writes the properties of all images: the classes of the masks, and the look of the boxes.
-pub(super) fn write_fixed(writer: &Writer<'_>) -> Result<(), RecordingError> {
-    writer.write_static(&boxes_entity(), &fixed_marks())?;
+pub(super) fn write_fixed(writer: &Writer<'_>, entity: &str) -> Result<(), RecordingError> {
+    writer.write_static(&boxes_entity(entity), &fixed_marks())?;
     let class = |class: VehicleClass| (mask_class(class).into(), class.name(), colour_of(class_colour(class)));
     let background = (0_u16, "background", colour_of([0; 4]));
     writer.write_static(
-        &masks_entity(),
+        &masks_entity(entity),
         &AnnotationContext::new(std::iter::once(background).chain(VehicleClass::ALL.map(class)).collect::<Vec<_>>()),
     )
 }
 
-/// Writes the instances of the images that were taken in these frames.
+/// Writes the instances of these images.
 pub(super) fn write<'a>(
     writer: &Writer<'_>,
-    part: &Shown,
-    frames: impl Iterator<Item = &'a Frame>,
+    (entity, part): (&str, &Shown),
+    images: impl Iterator<Item = &'a RearImage>,
 ) -> Result<(), RecordingError> {
-    let images: Vec<(Time, &[Instance])> =
-        frames.filter_map(|frame| frame.rear_image.as_ref().map(|image| (frame.time, &image.instances[..]))).collect();
+    let images: Vec<(Time, &[Instance])> = images.map(|image| (image.time, &image.instances[..])).collect();
     let marks = images.iter().map(|(time, instances)| (*time, boxes(part, instances)));
     let (boxes, labels): (Vec<_>, Vec<_>) =
         marks.map(|(time, (boxes, labels))| ((time, boxes), (time, labels))).unzip();
     let masks: Vec<(Time, SegmentationImage)> =
         images.iter().map(|(time, instances)| (*time, masks(part, instances))).collect();
-    writer.write_each(&boxes_entity(), &rows(&boxes))?;
-    writer.write_each(LABELS_ENTITY, &rows(&labels))?;
-    writer.write_each(&masks_entity(), &rows(&masks))
+    writer.write_each(&boxes_entity(entity), &rows(&boxes))?;
+    writer.write_each(&labels_entity(entity), &rows(&labels))?;
+    writer.write_each(&masks_entity(entity), &rows(&masks))
 }
 
 fn rows<T: AsComponents>(whats: &[(Time, T)]) -> Vec<(Time, &dyn AsComponents)> {

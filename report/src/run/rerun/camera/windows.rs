@@ -2,19 +2,26 @@
 //! each.
 
 use closecall_sensors::Detection;
-use closecall_sensors::camera::{PixelRect, RearCamera};
+use closecall_sensors::camera::{Pipeline, PixelRect, RearCamera, best_camera};
 
 use super::{Shown, class_colour, clear_covered, in_picture, labels_in_strip};
 use crate::run::film::{Film, Frame};
 use crate::run::rerun::palette::{self, Rgba};
 use rerun::{Boxes2D, Points2D};
 
-/// Returns the windows of the detections of a frame with their classes, and their labels.
-pub(super) fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> (Boxes2D, Points2D) {
+/// Returns the windows of the detections of a frame that the camera with this number classifies,
+/// with their classes, and their labels.
+pub(super) fn windows(film: &Film, number: usize, frame: &Frame) -> (Boxes2D, Points2D) {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
-    let in_image: Vec<(&Detection, PixelRect)> =
-        boxes.iter().filter_map(|detection| Some((detection, camera.detection_window(&ego, detection)?))).collect();
+    let cameras: Vec<RearCamera> = film.cameras.iter().map(|(camera, _)| RearCamera::new(*camera)).collect();
+    let used = || cameras.iter().enumerate().filter(|(_, camera)| camera.camera().pipeline != Pipeline::Off);
+    let camera = &cameras[number];
+    let in_image: Vec<(&Detection, PixelRect)> = boxes
+        .iter()
+        .filter(|detection| best_camera(used(), &ego, detection) == Some(number))
+        .filter_map(|detection| Some((detection, camera.detection_window(&ego, detection)?)))
+        .collect();
     let part = Shown::of(camera.camera().resolution);
     let ends = |window: &PixelRect| {
         let [left, top] = [window.left, window.top].map(|start| start as f32);

@@ -200,13 +200,7 @@ fn every_lidar_has_its_points_and_boxes_where_it_looks() {
     let text = "base = \"low-thw-overtake\"\nname = \"three\"\nduration-s = 3.0\nsensors.mode = \"full\"\n\
                 sensors.rear-camera.pipeline = \"off\"\nsensors.front-lidar.name = \"nose\"\n\
                 sensors.additional-rear-lidars = [{ name = \"left\", left-m = 0.8, azimuth-deg = 45.0 }]\n";
-    let file = ScenarioFile::parse(Path::new("three.toml"), text, &[]).unwrap();
-    let scenario = file.concrete(&file.space().nominal()).unwrap();
-    let arm = Arm { controller: ControllerChoice::MIS.factory(), sensors: None };
-    let key = RunKey { seed: 1, sample: 0 };
-    let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Full);
-    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
-    let films = [recorder.finish(&outcome)];
+    let films = [filmed_text(text, Level::Full)];
     let data = chunks(&films, StoreKind::Recording);
     for root in ["lidar", "lidars/nose", "lidars/left"] {
         for layer in ["clusters", "intensity", "rejected", "boxes"] {
@@ -240,17 +234,41 @@ fn every_lidar_has_its_points_and_boxes_where_it_looks() {
     assert!(frames.iter().all(|frame| frame.rear_fields.len() == 2));
 }
 
+#[test]
+fn every_camera_has_its_pictures_and_a_view() {
+    let text = "base = \"low-thw-overtake\"\nname = \"two\"\nduration-s = 3.0\nsensors.mode = \"full\"\n\
+                sensors.additional-rear-cameras = [{ name = \"tele\", field-of-view-deg = 25.0, left-m = 0.5 }]\n";
+    let films = [filmed_text(text, Level::Full)];
+    let data = chunks(&films, StoreKind::Recording);
+    for root in ["camera", "cameras/tele"] {
+        for layer in ["", "/windows", "/labels"] {
+            let entity = format!("/mis/world/ego/{root}{layer}");
+            assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+        }
+    }
+    let layout = chunks(&films, StoreKind::Blueprint);
+    let origins: Vec<String> = layout.iter().flat_map(|chunk| texts(chunk, "ViewBlueprint:space_origin")).collect();
+    assert!(origins.iter().any(|origin| origin.ends_with("world/ego/cameras/tele")), "{origins:?}");
+    let (_, empty, _) = empty_views(&films);
+    assert!(empty.is_empty(), "{empty:?}");
+}
+
 /// Returns the film of a short run behind which a car drives, in mode `full` with these keys.
 fn filmed_with(keys: &str) -> Film {
     let text = format!(
         "base = \"low-thw-overtake\"\nname = \"radars\"\nduration-s = 4.0\nsensors.mode = \"full\"\n\
          sensors.rear-camera.pipeline = \"off\"\nroad.guard-rails = true\n{keys}"
     );
-    let file = ScenarioFile::parse(Path::new("radars.toml"), &text, &[]).unwrap();
+    filmed_text(&text, Level::Objects)
+}
+
+/// Returns the film of the nominal run of a scenario with this text.
+fn filmed_text(text: &str, level: Level) -> Film {
+    let file = ScenarioFile::parse(Path::new("own.toml"), text, &[]).unwrap();
     let scenario = file.concrete(&file.space().nominal()).unwrap();
     let arm = Arm { controller: ControllerChoice::MIS.factory(), sensors: None };
     let key = RunKey { seed: 1, sample: 0 };
-    let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Objects);
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, level);
     let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
     recorder.finish(&outcome)
 }

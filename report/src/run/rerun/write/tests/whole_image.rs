@@ -34,9 +34,10 @@ fn instances() -> Vec<Instance> {
 /// Returns a film whose camera took an image in every fifth step, with the same instances in each.
 fn film_with_images() -> Film {
     let mut film = filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full));
-    film.camera.as_mut().unwrap().0.pipeline = Pipeline::MaskRcnn;
+    film.cameras[0].0.pipeline = Pipeline::MaskRcnn;
     for frame in film.frames.iter_mut().step_by(5) {
-        frame.rear_image = Some(RearImage { time: frame.time, shown_time: frame.time, instances: instances() });
+        let (time, shown_time) = (frame.time, frame.time);
+        frame.rear_images = vec![RearImage { camera: "rear-camera", time, shown_time, instances: instances() }];
     }
     film
 }
@@ -63,7 +64,7 @@ fn the_pinhole_has_the_size_of_the_picture_that_is_shown_of_a_larger_image() {
     };
     let config = r#"{ "resolution": { "width-px": 2560, "height-px": 1200 }, "yaw-deg": 20 }"#;
     let config: CameraConfig = serde_json::from_str(config).unwrap();
-    film.camera.as_mut().unwrap().0 = config.check(&Parameters::default()).unwrap();
+    film.cameras[0].0 = config.check(&Parameters::default()).unwrap();
     // Every tenth of 2560 columns, and of the rows from 260 to 1020.
     assert_eq!(shown(film), [[256.0, 76.0]]);
 }
@@ -145,7 +146,7 @@ fn a_frozen_camera_shows_the_scene_that_it_holds() {
     let mut frozen = moving.clone();
     let first = frozen.frames[0].time;
     for frame in &mut frozen.frames {
-        frame.rear_image.iter_mut().for_each(|image| image.shown_time = first);
+        frame.rear_images.iter_mut().for_each(|image| image.shown_time = first);
     }
     let [moving, frozen] = [moving, frozen].map(images_of);
     assert_eq!(moving.len(), frozen.len());
