@@ -135,6 +135,16 @@ fn a_failing_sample_is_found_looked_at_and_opened_in_the_viewer() {
     page.evaluate("document.getElementById('reset').click()");
     page.wait_for(&format!("{CHOSEN} === 300"));
 
+    // Without a number, and with one that no sample has, the field says so, and no sample is shown.
+    let shown_before = page.evaluate("document.getElementById('sample').innerText");
+    for wrong in ["", "300"] {
+        let show = "document.querySelector('#filters [name=number]').value = 'WRONG'; document.querySelector('#filters [type=submit]').click()";
+        page.evaluate(&show.replace("WRONG", wrong));
+        let said = page.evaluate("document.querySelector('#filters [name=number]').validationMessage");
+        assert_eq!(said, json!("No sample of this scenario has this number."), "{wrong}");
+        assert_eq!(page.evaluate("document.getElementById('sample').innerText"), shown_before, "{wrong}");
+    }
+
     // Outcomes are switched off: none but induced and shared collisions are left.
     page.evaluate(
         "document.querySelectorAll('#fates input').forEach(input => { if (input.value < 2 && input.checked) input.click(); })",

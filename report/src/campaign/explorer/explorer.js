@@ -361,7 +361,14 @@ const start = async () => {
       update();
     });
   }
-  const number = () => { const row = samples.row.get(Number(form.elements.number.value)); if (row !== undefined) { show(row); byId('sample').focus(); } };
+  // An empty field would be the number 0.
+  const field = form.elements.number;
+  const number = () => {
+    const row = field.value === '' ? undefined : samples.row.get(Number(field.value));
+    field.setCustomValidity(row === undefined ? 'No sample of this scenario has this number.' : '');
+    if (field.reportValidity()) { show(row); byId('sample').focus(); }
+  };
+  form.noValidate = true; // each Show checks anew
   form.addEventListener('submit', event => { event.preventDefault(); number(); });
   form.addEventListener('change', event => { if (event.target.name === 'number') return; if (['scenario', 'arm'].includes(event.target.name)) choose(); update(); });
   byId('reset').addEventListener('click', () => { form.elements.reason.value = form.elements.cause.value = ''; choose(); update(); });
