@@ -368,7 +368,7 @@ fn a_library_whose_constructor_loops_or_ends_the_process_is_refused() {
     let place = folder();
     let source = place.path().join("odd.c");
     for (body, expected) in
-        [("for (;;) ;", "is not loaded within 10 s"), ("exit(0);", "the process ended (exit status: 0)")]
+        [("for (;;) ;", "is not loaded within 10 s"), ("exit(0);", "the controller ended its process (exit status: 0)")]
     {
         let text = format!(
             "#include <stdlib.h>\n__attribute__((constructor)) static void begin(void) {{ {body} }}\n\
