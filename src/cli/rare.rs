@@ -10,7 +10,7 @@ use clap::Args;
 use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::arguments::positive;
 use closecall_campaign::execution::CampaignError;
-use closecall_campaign::gate::LEAST_SAMPLES;
+use closecall_campaign::gate::{GateSet, GateSource, LEAST_SAMPLES, ProbabilitySpec};
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
@@ -28,7 +28,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Setting, library};
 use closecall_sensors::SensorMode;
 use closecall_studies::case::Case;
-use closecall_studies::minimize::{MinimizedText, minimize, output_files, write_files};
+use closecall_studies::minimize::{MinimizedText, minimize, output_files, with_choice, write_files};
 use closecall_traffic::statistics::format::percent;
 use closecall_traffic::words::counted;
 use serde_json::{Value, json};
@@ -220,7 +220,7 @@ impl Rare<'_> {
         let code = self.conclude(&reports, &campaign.works, &manifest.campaign, folder.as_ref())?;
         if self.method == Method::Search {
             for (report, work) in reports.iter().zip(&campaign.works) {
-                self.minimize(report, work, nearness.expression())?;
+                self.minimize(report, work, &manifest.campaign, nearness.expression())?;
             }
         }
         Ok(code)
@@ -234,6 +234,9 @@ impl Rare<'_> {
         manifest: &Manifest,
         folder: Option<&RareFolder>,
     ) -> Result<ExitCode, CliError> {
+        let reports: Vec<RareReport> =
+            reports.iter().zip(works).map(|(report, work)| self.with_weakened(report, work)).collect();
+        let reports = &reports[..];
         // A search has no gate, and judges by its exit code.
         let judges = self.gate.is_some() || self.method == Method::Search;
         let remark = known_seed(judges, manifest, self.can_draw_seed);
@@ -253,6 +256,21 @@ impl Rare<'_> {
             }
         }
         Ok(ExitCode::first_of(reports.iter().map(|report| self.code(report))))
+    }
+
+    /// Returns a report that says what settings or the gate of the command line demand less than the
+    /// file of the scenario: a low probability then does not pass.
+    fn with_weakened(&self, report: &RareReport, work: &Work) -> RareReport {
+        let mut report = report.clone();
+        let Some(gate) = self.gate else { return report };
+        let probability = Some(ProbabilitySpec { gate, source: GateSource::CommandLine });
+        let of_gate = GateSet { probability, ..GateSet::default() }.weakened_in(&work.file);
+        let weakened: Vec<String> = work.file.config().overridden.iter().cloned().chain(of_gate).collect();
+        if !weakened.is_empty() {
+            let weakened = weakened.join("; ");
+            report.not_judged.push(format!("a setting weakened what the scenario is judged by: {weakened}"));
+        }
+        report
     }
 
     /// Says what a part of the campaign holds, which has no estimate of its own.
@@ -359,10 +377,17 @@ impl Rare<'_> {
 
     /// Reduces the case that a search has found to the smallest one, and writes it as a scenario into
     /// the folder. An event without a collision is not reduced.
-    fn minimize(&self, report: &RareReport, work: &Work, event: EventExpression) -> Result<(), CliError> {
+    fn minimize(
+        &self,
+        report: &RareReport,
+        work: &Work,
+        manifest: &Manifest,
+        event: EventExpression,
+    ) -> Result<(), CliError> {
         let Some(nearest) = report.nearest.first() else { return Ok(()) };
         let Some(case) = case(work, nearest, event) else { return Ok(()) };
         let Some(minimized) = minimize(&case)? else { return Ok(()) };
+        let minimized = with_choice(manifest, minimized);
         let Some(folder) = self.folder else {
             if self.format == Format::Human {
                 textln!("  smallest case: {}", minimized.sentence);

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, json, library, message, records, stderr, stdout};
+use crate::native_controllers::{compile, lib};
+use crate::support::{ROOT, closecall, code, folder, json, library, message, records, stderr, stdout};
 
 fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
     let scenario = library("low-thw-overtake");
@@ -128,6 +129,27 @@ fn a_search_beyond_the_samples_of_two_campaigns_finds_a_regression_and_writes_it
     std::fs::write(out.join("rare-journal.jsonl"), &whole[..whole.len() / 2]).unwrap();
     stdout(&compare(&before, &after, &[&search[..], &["--resume"]].concat()), 1);
     assert!(journal(&out) == whole);
+}
+
+/// The command that repeats a case names the file of a controller, not its name in reports.
+#[test]
+fn a_regression_of_a_library_is_run_by_the_command_that_the_search_prints() {
+    let folder = folder();
+    let source = std::fs::read_to_string(Path::new(ROOT).join("examples/acc_controller.c")).unwrap();
+    let longer =
+        source.replacen("own->time_gap_s = setting(setup, \"acc.time_gap_s\", NAN);", "own->time_gap_s = 1.6;", 1);
+    assert_ne!(source, longer);
+    let few = |name: &str, text: &str| {
+        let file = folder.path().join(format!("{name}.c"));
+        std::fs::write(&file, text).unwrap();
+        let library = lib(&compile(file.to_str().unwrap(), &folder.path().join(format!("{name}.so")), &[]));
+        let words = ["-n", "2", "--sensors", "object", "--controller", &library];
+        (campaign(folder.path().join(name), &words), library)
+    };
+    let ((before, _), (after, library)) = (few("before", &source), few("after", &longer));
+    let out = folder.path().join("found");
+    let text = stdout(&compare(&before, &after, &["--search", "--seed", "7", "--out", out.to_str().unwrap()]), 1);
+    assert!(text.lines().any(|line| line.starts_with("fails:") && line.ends_with(&library)), "{text}");
 }
 
 #[test]

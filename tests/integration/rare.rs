@@ -250,6 +250,10 @@ fn an_event_that_cannot_happen_is_not_judged() {
     assert!(value["scenarios"][0]["not_judged"][0].as_str().unwrap().contains("at least 95.0 % expected"), "{value}");
     let search = stdout(&run("--design search -n 300 --set duration-s=2"), 4);
     assert!(search.contains("not found") && search.contains("did not happen"), "{search}");
+    // A setting that no longer asks for what the scenario is about does not make it pass.
+    let text = stdout(&run("--design importance -n 3000 --max-probability 0.1 --set duration-s=2 --set expects=[]"), 4);
+    assert!(text.contains("weakened what the scenario is judged by: expects lead_braked"), "{text}");
+    assert!(text.contains("NOT JUDGED: 1.000e-1 allowed"), "{text}");
     // As it is, the scenario is about what it says, and a limit that is too low still fails.
     let value = json(&run("--design importance -n 3000 --max-probability 0.9 --format json"), 0);
     assert_eq!(value["scenarios"][0]["not_judged"].as_array().unwrap().len(), 0, "{value}");

@@ -28,7 +28,7 @@ mod words;
 mod write;
 
 pub use nearest::{NearestFailure, NearestSearch};
-pub use run::{Minimized, Offset, minimize, minimize_sample};
+pub use run::{Minimized, Offset, minimize, minimize_sample, with_choice};
 pub use text::MinimizedText;
 pub use trial::WithoutOutcome;
 pub use twin::Twin;

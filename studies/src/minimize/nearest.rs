@@ -194,7 +194,8 @@ impl NearestSearch {
         let distance_sd = Some(nearest.length_sd());
         let further = failures.iter().map(|failure| failure.trial.without_outcome());
         let without_outcome = further.fold(without_outcome, WithoutOutcome::joined);
-        Ok(with_choice(saved, Minimized { nearest: Some(details), distance_sd, without_outcome, ..described }))
+        let minimized = Minimized { nearest: Some(details), distance_sd, without_outcome, ..described };
+        Ok(with_choice(saved.manifest(), minimized))
     }
 
     /// Returns the failing samples that are nearest to the nominal case, the nearest first. A

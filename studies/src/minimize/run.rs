@@ -1,6 +1,7 @@
 //! Minimizes a failing sample.
 
 use closecall_campaign::action::{Action, CommandFor};
+use closecall_campaign::manifest::Manifest;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_traffic::{ParameterName, Parameters, Value};
@@ -159,13 +160,12 @@ pub(super) fn described(
 /// # Errors
 /// [`CausesError`] if the sample does not fail, or has no outcome.
 pub fn minimize_sample(saved: &SavedCampaign, case: &Case) -> Result<Minimized, CausesError> {
-    Ok(with_choice(saved, minimize(case)?.ok_or_else(|| passes(saved, case))?))
+    Ok(with_choice(saved.manifest(), minimize(case)?.ok_or_else(|| passes(saved, case))?))
 }
 
 /// Names the controller of a case as the option `--controller` takes it.
-pub(super) fn with_choice(saved: &SavedCampaign, minimized: Minimized) -> Minimized {
+pub fn with_choice(manifest: &Manifest, minimized: Minimized) -> Minimized {
     // A process has a name in reports, and a command on the command line.
-    let manifest = saved.manifest();
     let mut arms = manifest.arms.iter().zip(manifest.arm_names());
     let choice = arms.find(|(_, name)| *name == minimized.controller).map(|(arm, _)| arm.to_string());
     Minimized { choice: choice.unwrap_or_else(|| minimized.controller.clone()), ..minimized }
