@@ -184,7 +184,7 @@ pub(super) fn goals(counts: &Counts) -> Option<String> {
 /// Returns in how many samples each arm makes the vehicle behind brake hard; `None` if none does.
 pub(super) fn imposed(summary: &Summary, counts: &Counts) -> Option<String> {
     let braking = |(name, arm): (&String, &ArmCounts)| {
-        let [.., mean_mps2] = arm.mean_cost()?;
+        let mean_mps2 = arm.mean_cost()?.imposed_braking_mps2;
         Some(format!(
             "{name} {} of {} ({}, mean {mean_mps2:.1} m/s²)",
             arm.imposed,
