@@ -85,8 +85,8 @@ pub(super) struct CampaignArgs {
     #[serde(default, deserialize_with = "parsed_option")]
     judge_seed: Option<JudgeSeed>,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence), `grid`, or `coverage` (fills
-    /// the holes of the scenario's [coverage]); `subset` or `importance` for the probability of a
-    /// rare event, which --event names, and `search` for its first case. -n is then the largest
+    /// the holes of the scenario's [coverage]). With --event: `subset` or `importance` estimates the
+    /// probability of a rare event, and `search` looks for its first case; -n is then the largest
     /// number of runs [default: 200000, of a search 2000]
     #[arg(long, default_value_t, help_heading = heading::SAMPLES)]
     #[serde(default, deserialize_with = "plain_design")]
@@ -94,10 +94,10 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     #[serde(skip)]
     rare: RareArgs,
-    /// After the samples, run FACTOR times as many with faster sensors (MODE is `object` or
-    /// `ground-truth`), the first ones with the same values and random numbers. Both together give
-    /// narrower intervals of the collision, prevented and induced rates, such as `object:20`: the
-    /// more the modes correlate, the narrower. The rates inform; gates judge the samples of the campaign alone
+    /// After the samples, run FACTOR times as many with faster sensors, such as `object:20`. MODE is
+    /// `object` or `ground-truth`. The first ones repeat the samples of the campaign. Both together
+    /// give narrower intervals of the collision, prevented and induced rates. Gates judge the
+    /// samples of the campaign alone
     #[arg(long, value_name = "MODE:FACTOR", help_heading = heading::SAMPLES)]
     #[serde(default, deserialize_with = "parsed_option")]
     fidelity: Option<FidelityChoice>,
@@ -113,7 +113,7 @@ pub(super) struct CampaignArgs {
     /// Number of worker threads [default: one per processor]
     #[arg(long, help_heading = heading::EXECUTION)]
     jobs: Option<Jobs>,
-    /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local`
+    /// Run the samples on a Ray cluster: `auto` (the cluster of this machine), HOST:PORT, or `local`
     /// (start one here). Needs the Python package: pip install "closecall[ray]"
     #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs", help_heading = heading::EXECUTION)]
     ray: Option<String>,
@@ -122,8 +122,8 @@ pub(super) struct CampaignArgs {
     #[arg(long, value_name = "S", help_heading = heading::EXECUTION)]
     sample_timeout_s: Option<Positive>,
     /// Run a sample up to N times more in a new process if the process of its library, FMU or
-    /// Python controller crashes or hangs. A sample that succeeds only in this way is FLAKY: it is
-    /// counted and listed, see --max-flaky [default: 0]
+    /// Python controller crashes or hangs. A sample that succeeds only after a repetition is flaky;
+    /// --max-flaky limits their number [default: 0]
     #[arg(long, value_name = "N", help_heading = heading::EXECUTION)]
     retry_crashed: Option<Retries>,
     #[command(flatten)]

@@ -75,7 +75,7 @@ pub(super) struct SensitivityArgs {
     /// Vary only the sampled parameters and the factors of --factor, not the list for driver, sensor and controller
     #[arg(long, help_heading = heading::METHOD)]
     no_default_factors: bool,
-    /// `morris`: only a screening; `sobol`: only a decomposition, by all factors; `both`: by the factors that matter
+    /// `morris`: screening only; `sobol`: decomposition by all factors; `both`: screening, then decomposition by the factors that matter
     #[arg(long, value_name = "morris|sobol|both", default_value = "both", help_heading = heading::METHOD)]
     method: Method,
     /// Number of trajectories of the screening, each with a run for every factor
