@@ -9,7 +9,7 @@ use crate::support::{ROOT, all_of_library, families_of_library, traffic_of_libra
 #[expect(dead_code, reason = "the program's entry is not called")]
 mod write_evidence;
 
-use write_evidence::page::{Section, Size, between_markers, outcomes, with_section};
+use write_evidence::page::{Section, Size, between_markers, outcomes, with_other_rows, with_section};
 
 /// Returns a committed section.
 fn committed(section: Section) -> String {
@@ -55,7 +55,7 @@ fn no_section_is_older_than_the_outcomes_that_it_shows() {
 fn the_committed_sections_have_the_form_that_the_program_writes() {
     let size = Size { samples: 3, member_samples: 2, seed: 1001 };
     for section in [Section::Arms, Section::Slowing] {
-        let written = write_evidence::written(section, size).unwrap();
+        let written = write_evidence::written(section, size, &[]).unwrap();
         let head = |text: &str| -> Vec<String> {
             text.lines()
                 .filter(|line| line.starts_with("| ") && line.contains(" without | with |"))
@@ -71,24 +71,37 @@ fn the_committed_sections_have_the_form_that_the_program_writes() {
 }
 
 #[test]
+fn rows_of_some_scenarios_join_the_others_of_the_same_outcomes() {
+    let section = |outcomes: &str, rows: &[&str]| {
+        let command = "| 1a2b | 2026-11-29 | any | `just xtask write-evidence scenarios -n 9 --seed 1001` |";
+        format!("{command} {outcomes} |\n\n| scenario | arm |\n|---|---|\n{}\n", rows.join("\n"))
+    };
+    let older =
+        section("c0ffee", &["| `a` | `x` | 1 |", "| `a` | `y` | 1 |", "| `b` | `x` | 1 |", "| `b` | `y` | 1 |"]);
+    let new = section("c0ffee", &["| `a` | `x` | 9 |", "| `a` | `y` | 9 |", "| `c` | `x` | 9 |"]);
+    let joined =
+        ["| `a` | `x` | 9 |", "| `a` | `y` | 9 |", "| `b` | `x` | 1 |", "| `b` | `y` | 1 |", "| `c` | `x` | 9 |"];
+    assert_eq!(with_other_rows(&new, &older).unwrap(), section("c0ffee", &joined).trim_end());
+    assert!(with_other_rows(&new, &older.replace("c0ffee", "decade")).unwrap_err().contains("outcomes have changed"));
+}
+
+#[test]
 fn every_scenario_of_the_library_is_in_the_tables() {
-    let tables = committed(Section::Scenarios);
-    let (judged, agreement) = tables.split_once("### Agreement of the sensor modes").unwrap();
-    let (scenarios, others) = judged.split_once("### Other functions").unwrap();
     let [aeb, acc, recorded, anchor, ramp] = families_of_library();
     let names: Vec<String> =
         [all_of_library(), ramp, traffic_of_library()].iter().flat_map(|paths| names(paths)).collect();
     let expected = names
         .iter()
         .flat_map(|name| ["mis", "mis-extended", "gap-1.6"].map(|arm| vec![format!("`{name}`"), format!("`{arm}`")]));
-    let listed = rows(scenarios);
+    let listed = [rows(&committed(Section::Scenarios)), rows(&committed(Section::Traffic))].concat();
     assert_eq!(listed.iter().map(|row| row[..2].to_vec()).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
     for row in &listed {
         assert_eq!(row.len(), 13, "{row:?}");
         let count = |index: usize| row[index].parse::<u64>().unwrap();
         assert_eq!(count(3), count(5) + count(9), "without = prevented + both: {row:?}");
     }
-    let others: Vec<Vec<String>> = rows(others).iter().map(|row| row[..2].to_vec()).collect();
+    let others: Vec<Vec<String>> =
+        rows(&committed(Section::OtherFunctions)).iter().map(|row| row[..2].to_vec()).collect();
     let others_expected: Vec<Vec<String>> = [acc, aeb]
         .iter()
         .flat_map(|paths| self::names(paths))
@@ -103,7 +116,7 @@ fn every_scenario_of_the_library_is_in_the_tables() {
     );
     let anchor = self::names(&anchor);
     assert!(!anchor.is_empty() && anchor.iter().all(|name| committed(Section::Anchor).contains(name)), "{anchor:?}");
-    let agreement = rows(agreement);
+    let agreement = rows(&committed(Section::Agreement));
     assert_eq!(
         agreement.iter().map(|row| row[0].clone()).collect::<Vec<_>>(),
         names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>()

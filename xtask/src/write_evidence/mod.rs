@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo run --release -p closecall-xtask -- write-evidence
 //! cargo run --release -p closecall-xtask -- write-evidence twins --samples 10000
+//! cargo run --release -p closecall-xtask -- write-evidence scenarios --scenario low-thw-overtake
 //! ```
 //!
 //! Each section of a page lies between two markers, and everything else on the page stays as it is.
@@ -35,12 +36,21 @@ pub(crate) struct Args {
     /// Seed of the random numbers
     #[arg(long, default_value_t = 1001)]
     seed: u64,
+    /// Write the rows of these scenarios alone, and keep the others of the section. The section must
+    /// have a row for each scenario, of the outcomes of this version
+    #[arg(long, value_name = "NAME")]
+    scenario: Vec<String>,
 }
 
-/// Returns the text of a section between its markers.
-pub(crate) fn written(section: Section, size: Size) -> Result<String, Box<dyn Error>> {
+/// Returns the text of a section between its markers. `only` names the scenarios of its rows; it is
+/// empty for all.
+pub(crate) fn written(section: Section, size: Size, only: &[String]) -> Result<String, Box<dyn Error>> {
     let table = match section {
-        Section::Scenarios => scenarios::library(size),
+        Section::Scenarios => scenarios::library(size, only),
+        Section::Traffic => scenarios::traffic(size, only),
+        Section::OtherFunctions => scenarios::other_functions(size, only),
+        Section::Agreement => scenarios::agreement(size, only),
+        _ if !only.is_empty() => Err(format!("{}: it has no row for each scenario", section.name()).into()),
         Section::Ensemble => scenarios::ensemble(size),
         Section::Arms => rows::arms(size),
         Section::Promise => rows::promise(size),
@@ -62,9 +72,13 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn Error>> {
     let sections = if args.sections.is_empty() { Section::ALL.to_vec() } else { args.sections };
     for section in sections {
         let started = Instant::now();
-        let written = written(section, size)?;
+        let mut written = written(section, size, &args.scenario)?;
         let path = page::root().join(section.page());
-        std::fs::write(&path, page::with_section(&std::fs::read_to_string(&path)?, section, &written)?)?;
+        let page = std::fs::read_to_string(&path)?;
+        if !args.scenario.is_empty() {
+            written = page::with_other_rows(&written, page::between_markers(&page, section)?)?;
+        }
+        std::fs::write(&path, page::with_section(&page, section, &written)?)?;
         println!("{}: {} after {:.0} s", section.page(), section.name(), started.elapsed().as_secs_f64());
     }
     Ok(())

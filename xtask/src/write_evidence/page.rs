@@ -20,9 +20,14 @@ pub(crate) struct Size {
 /// A section of a page, which stands between markers of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Section {
-    /// Every scenario with its own drivers and full sensors, and the agreement of the object-level
-    /// sensors
+    /// Every scenario with its own drivers and full sensors, but for the next two
     Scenarios,
+    /// The scenarios with surrounding traffic, likewise
+    Traffic,
+    /// The scenarios that judge emergency braking or cruise control
+    OtherFunctions,
+    /// The agreement of the object-level sensors with the full ones
+    Agreement,
     /// The driver ensemble with object-level sensors
     Ensemble,
     /// Every controller that ships, on the headline
@@ -53,8 +58,11 @@ const DIGESTS: &str = "docs/evidence/determinism.json";
 const DIGITS: usize = 12;
 
 impl Section {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 15] = [
         Self::Scenarios,
+        Self::Traffic,
+        Self::OtherFunctions,
+        Self::Agreement,
         Self::Ensemble,
         Self::Arms,
         Self::Promise,
@@ -82,8 +90,10 @@ impl Section {
     fn rests_on(self, scenario: &str) -> bool {
         let is_headline = scenario == "low-thw-overtake";
         match self {
-            Self::Scenarios => super::scenarios::have(scenario) || super::scenarios::have_as_other_function(scenario),
-            Self::Ensemble => super::scenarios::have(scenario),
+            Self::Scenarios => super::scenarios::have(scenario) && !super::scenarios::have_as_traffic(scenario),
+            Self::Traffic => super::scenarios::have_as_traffic(scenario),
+            Self::OtherFunctions => super::scenarios::have_as_other_function(scenario),
+            Self::Agreement | Self::Ensemble => super::scenarios::have(scenario),
             Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
             Self::Twins => super::rows::TWINS.contains(&scenario),
             Self::EventFree => super::rows::rests_without_event_on(scenario),
@@ -95,12 +105,12 @@ impl Section {
 
     /// Returns true if the figures rest on runs with full sensors.
     const fn is_full(self) -> bool {
-        matches!(self, Self::Scenarios | Self::Promise | Self::Twins | Self::Faults)
+        self.is_full_alone() || matches!(self, Self::Agreement | Self::Faults)
     }
 
     /// Returns true if the figures rest on no runs with object-level sensors.
     const fn is_full_alone(self) -> bool {
-        matches!(self, Self::Promise | Self::Twins)
+        matches!(self, Self::Scenarios | Self::Traffic | Self::OtherFunctions | Self::Promise | Self::Twins)
     }
 
     /// Returns the name on the command line.
@@ -136,6 +146,32 @@ pub(crate) fn with_section(page: &str, section: Section, written: &str) -> Resul
     let [begin, end] = section.markers();
     let old = between_markers(page, section)?;
     Ok(page.replacen(&format!("{begin}{old}{end}"), &format!("{begin}\n\n{}\n\n{end}", written.trim_end()), 1))
+}
+
+/// Returns a written section with the rows of the older one, too, if they are of other scenarios.
+/// The rows keep the order of the older section.
+pub(crate) fn with_other_rows(written: &str, older: &str) -> Result<String, String> {
+    let is_row = |line: &&str| line.starts_with("| `");
+    let scenario = |line: &str| line.split(" | ").next().unwrap_or_default().to_owned();
+    let outcomes =
+        |text: &str| Some(text.lines().find(|line| line.contains("write-evidence "))?.rsplit('|').nth(1)?.to_owned());
+    if outcomes(written) != outcomes(older) {
+        return Err("outcomes have changed since the other rows were measured: write all of them".to_owned());
+    }
+    let mut new: Vec<&str> = written.lines().filter(is_row).collect();
+    let mut rows = Vec::new();
+    for line in older.lines().filter(is_row) {
+        let name = scenario(line);
+        let renewed: Vec<&str> = new.extract_if(.., |row| scenario(row) == name).collect();
+        match renewed.is_empty() {
+            false => rows.extend(renewed),
+            true if written.lines().any(|row| scenario(row) == name) => {}
+            true => rows.push(line),
+        }
+    }
+    rows.extend(new);
+    let head: Vec<&str> = written.lines().take_while(|line| !is_row(line)).collect();
+    Ok([head, rows].concat().join("\n"))
 }
 
 /// Returns the outcomes that a section depends on, in a few digits: the outcomes of [`DIGESTS`]

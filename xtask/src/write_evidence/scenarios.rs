@@ -44,19 +44,31 @@ const TRAFFIC: &str = "traffic";
 /// has a page of its own.
 const OTHER_FUNCTIONS: [&str; 2] = ["acc", "aeb"];
 
+/// Returns the folder of a scenario, by its path below the folder of the library.
+fn folder_of(scenario: &str) -> &str {
+    scenario.rsplit_once('/').map_or("", |(folder, _)| folder)
+}
+
 /// Returns true if the tables have a scenario, by its path below the folder of the library.
 pub(super) fn have(scenario: &str) -> bool {
-    FOLDERS.contains(&scenario.rsplit_once('/').map_or("", |(folder, _)| folder))
+    FOLDERS.contains(&folder_of(scenario))
+}
+
+/// Returns true if a scenario has surrounding traffic, by its path below the folder of the library.
+pub(super) fn have_as_traffic(scenario: &str) -> bool {
+    folder_of(scenario) == TRAFFIC
 }
 
 /// Returns true if the table of the other functions has a scenario, by its path below the folder of
 /// the library.
 pub(super) fn have_as_other_function(scenario: &str) -> bool {
-    scenario.split_once('/').is_some_and(|(folder, _)| OTHER_FUNCTIONS.contains(&folder))
+    OTHER_FUNCTIONS.contains(&folder_of(scenario))
 }
 
 /// A scenario of the library, with the number of samples that its table rests on.
 struct Entry {
+    /// The folder of the scenario, below the folder of the library.
+    folder: &'static str,
     file: ScenarioFile,
     samples: u64,
 }
@@ -76,48 +88,63 @@ fn head(sentence: &str) -> String {
     )
 }
 
-/// Returns the table of the scenarios with their own drivers, and the agreement of the sensor
-/// modes. It takes hours: each scenario's rows appear as soon as they are known.
+/// Returns the table of the scenarios with their own drivers but for those with surrounding traffic.
+pub(super) fn library(size: Size, only: &[String]) -> Result<String, Box<dyn Error>> {
+    table(size, only, |folder| folder != TRAFFIC)
+}
+
+/// Returns the table of the scenarios with surrounding traffic, with their own drivers.
+pub(super) fn traffic(size: Size, only: &[String]) -> Result<String, Box<dyn Error>> {
+    table(size, only, |folder| folder == TRAFFIC)
+}
+
+/// Returns the table of the scenarios of these folders in every arm. It takes hours: each scenario's
+/// rows appear as soon as they are known.
 #[expect(clippy::print_stderr, reason = "a program on the command line")]
-pub(super) fn library(size: Size) -> Result<String, Box<dyn Error>> {
-    let Size { samples, member_samples, seed } = size;
-    let mut text = head(&format!(
-        "{samples} samples of each scenario with seed {seed} and `full` sensors; {member_samples} of each scenario with \
-         surrounding traffic; one of a scenario in which nothing varies."
-    ));
+fn table(size: Size, only: &[String], has: impl Fn(&str) -> bool) -> Result<String, Box<dyn Error>> {
+    let mut text = head(&format!("Each scenario with seed {} and `full` sensors.", size.seed));
     text.push_str(COLUMNS);
-    let library = entries(size)?;
     let arms = ARMS.map(|(name, _)| name);
-    for Entry { file, samples } in &library {
-        let size = Size { samples: *samples, ..size };
-        let name = file.config().name.clone();
-        let rows = rows_of(&name, *samples, &run(vec![file.clone()], size, Some(SensorMode::Full), &arms)?)?;
-        eprint!("{rows}");
-        text.push_str(&rows);
-    }
-    text.push_str(
-        "\n### Other functions\n\nScenarios that judge emergency braking or cruise control. Each is compared with the same stack \
-         without the function.\n",
-    );
-    text.push_str(COLUMNS);
-    for path in OTHER_FUNCTIONS.map(files_of).into_iter().collect::<Result<Vec<_>, _>>()?.concat() {
-        let file = ScenarioFile::load(&path, &[])?;
-        let arms = ControllerChoice::of_function(file.config().function).map(|arm| arm.to_string());
-        let arms = arms.each_ref().map(String::as_str);
+    for Entry { file, samples, .. } in entries(size, only)?.into_iter().filter(|entry| has(entry.folder)) {
+        let size = Size { samples, ..size };
         let name = file.config().name.clone();
         let rows = rows_of(&name, samples, &run(vec![file], size, Some(SensorMode::Full), &arms)?)?;
         eprint!("{rows}");
         text.push_str(&rows);
     }
-    text.push_str(
-        "\n### Agreement of the sensor modes\n\nCollisions of the ego with the controller `mis`, on the first of the same \
-         samples with `full` and with `object` sensors. κ is Cohen's; it is undefined if no run or every run \
-         collides.\n\n| scenario | samples | collisions: `full` | `object` | samples that differ | κ |\n\
-         |---|---|---|---|---|---|\n",
+    Ok(text)
+}
+
+/// Returns the table of the scenarios that judge emergency braking or cruise control.
+pub(super) fn other_functions(size: Size, only: &[String]) -> Result<String, Box<dyn Error>> {
+    let Size { samples, seed, .. } = size;
+    let mut text = format!(
+        "Scenarios that judge emergency braking or cruise control, with seed {seed} and `full` sensors. Each is compared \
+         with the same stack without the function.\n{COLUMNS}"
     );
-    for Entry { file, samples } in &library {
-        let samples = (*samples).min(member_samples);
-        let agreement = Agreement::of(file, seed, samples)?;
+    for path in OTHER_FUNCTIONS.map(files_of).into_iter().collect::<Result<Vec<_>, _>>()?.concat() {
+        let file = ScenarioFile::load(&path, &[])?;
+        let arms = ControllerChoice::of_function(file.config().function).map(|arm| arm.to_string());
+        let arms = arms.each_ref().map(String::as_str);
+        let name = file.config().name.clone();
+        if is_meant(&name, only) {
+            text.push_str(&rows_of(&name, samples, &run(vec![file], size, Some(SensorMode::Full), &arms)?)?);
+        }
+    }
+    Ok(text)
+}
+
+/// Returns the agreement of the sensor modes in every scenario.
+pub(super) fn agreement(size: Size, only: &[String]) -> Result<String, Box<dyn Error>> {
+    let Size { member_samples, seed, .. } = size;
+    let mut text = format!(
+        "Collisions of the ego with the controller `mis`, on the same samples with `full` and with `object` sensors, with \
+         seed {seed}. κ is Cohen's; it is undefined if no run or every run collides.\n\n\
+         | scenario | samples | collisions: `full` | `object` | samples that differ | κ |\n|---|---|---|---|---|---|\n"
+    );
+    for Entry { file, samples, .. } in entries(size, only)? {
+        let samples = samples.min(member_samples);
+        let agreement = Agreement::of(&file, seed, samples)?;
         let collisions = |has: fn(&Pair) -> bool| agreement.pairs.iter().filter(|pair| has(pair)).count();
         writeln!(
             text,
@@ -148,7 +175,7 @@ pub(super) fn ensemble(size: Size) -> Result<String, Box<dyn Error>> {
     )?;
     let members = members(&[])?;
     let size = Size { samples: member_samples, ..size };
-    for Entry { file, .. } in entries(size)? {
+    for Entry { file, .. } in entries(size, &[])? {
         let ensemble = ensemble_of(&[file], &members)?;
         if !ensemble.entries.is_empty() {
             let arms = ARMS.map(|(name, _)| name);
@@ -159,8 +186,9 @@ pub(super) fn ensemble(size: Size) -> Result<String, Box<dyn Error>> {
 }
 
 /// Returns the scenarios that judge the margin increase system, folder by folder in alphabetical
-/// order; scenarios with surrounding traffic come last.
-fn entries(size: Size) -> Result<Vec<Entry>, Box<dyn Error>> {
+/// order; scenarios with surrounding traffic come last. `only` names those that are meant; it is
+/// empty for all.
+fn entries(size: Size, only: &[String]) -> Result<Vec<Entry>, Box<dyn Error>> {
     let mut entries = Vec::new();
     for folder in FOLDERS {
         let samples = if folder == TRAFFIC { size.member_samples } else { size.samples };
@@ -168,10 +196,17 @@ fn entries(size: Size) -> Result<Vec<Entry>, Box<dyn Error>> {
             let file = ScenarioFile::load(&path, &[])?;
             // If nothing varies, all samples are the same.
             let is_fixed = file.space().variation() == Variation::None;
-            entries.push(Entry { file, samples: if is_fixed { 1 } else { samples } });
+            if is_meant(&file.config().name, only) {
+                entries.push(Entry { folder, file, samples: if is_fixed { 1 } else { samples } });
+            }
         }
     }
     Ok(entries)
+}
+
+/// Returns true if a scenario is one of these, or if these are none.
+fn is_meant(name: &str, only: &[String]) -> bool {
+    only.is_empty() || only.iter().any(|meant| meant == name)
 }
 
 /// Runs scenarios in arms, the baseline first; with the sensors of the scenario if `mode` is
