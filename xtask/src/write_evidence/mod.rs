@@ -75,6 +75,9 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn Error>> {
         let mut written = written(section, size, &args.scenario)?;
         let path = page::root().join(section.page());
         let page = std::fs::read_to_string(&path)?;
+        if let Some(name) = args.scenario.iter().find(|name| !written.contains(&format!("| `{name}` |"))) {
+            return Err(format!("{}: the section has no scenario `{name}`", section.name()).into());
+        }
         if !args.scenario.is_empty() {
             written = page::with_other_rows(&written, page::between_markers(&page, section)?)?;
         }
