@@ -16,7 +16,7 @@ use crate::{Detection, Extent, Scene, SceneVehicle, SeenBy, SeenPart};
 /// Least overlap at which an instance and a detection belong together, as a share of the smaller
 /// box (assumption: a cluster may be a part of the vehicle, and the length of its box is often
 /// assumed).
-const MIN_OVERLAP: f64 = 0.5;
+pub(crate) const MIN_OVERLAP: f64 = 0.5;
 /// Such a share above which an instance is not the camera's alone (assumption).
 const TOUCHING: f64 = 0.2;
 /// Least intersection over union at which two instances are the same vehicle with two classes: the

@@ -7,12 +7,14 @@
 //! One camera classifies a detection, even if several see it: scores of two pictures of the same
 //! moment would count as independent, and the shape, the light and the background are the same. A
 //! camera that delivers no image, or is known to have failed, leaves its detections to the others.
+//! A vehicle that no detection belongs to counts once, too, as the camera that sees it best finds it.
 
-use crate::camera::{CameraFault, Pipeline, RearCamera, best_camera};
+use crate::camera::{CameraFault, Pipeline, RearCamera, best_camera, overlap};
 use crate::detection_classifier::DetectionClassifier;
 use crate::faults::FaultList;
+use crate::image_evidence::MIN_OVERLAP;
 use crate::tracking::RearView;
-use crate::{Detection, Health, RearImage, Scene, SensorError, joint_health};
+use crate::{Detection, Health, RearImage, Scene, SceneVehicle, SensorError, joint_health};
 
 /// Maximum number of rear cameras besides the first.
 pub const MAX_ADDITIONAL_CAMERAS: usize = 3;
@@ -36,6 +38,12 @@ impl CameraMember {
         let is_dead = self.faults.at(scene.time).is_some_and(|fault| fault.is_dead);
         !is_dead && self.classifier.health() != Health::Failed
     }
+
+    /// Returns whether two detections may be the same vehicle: the camera sees them in one place.
+    fn sees_as_one(&self, ego: &SceneVehicle, detections: [&Detection; 2]) -> bool {
+        let [one, other] = detections.map(|detection| self.camera.detection_bounds(ego, detection));
+        one.zip(other).is_some_and(|(one, other)| overlap(&one, &other) >= MIN_OVERLAP)
+    }
 }
 
 /// The cameras of one run.
@@ -55,20 +63,42 @@ impl SeveralCameras {
         Self { members, owners: Vec::new(), given: Vec::new(), alone: Vec::new() }
     }
 
-    /// Returns the number of the camera that sees a detection best among those that `may` see it: a
-    /// working one if there is one.
-    fn owner(&self, scene: &Scene<'_>, detection: &Detection, may: impl Fn(&CameraMember) -> bool) -> Option<usize> {
+    /// Returns the number of the camera that sees a detection best: a working one if there is one.
+    fn owner(&self, scene: &Scene<'_>, detection: &Detection) -> Option<usize> {
         let best = |is_asked: &dyn Fn(&CameraMember) -> bool| {
-            let asked = self.members.iter().enumerate().filter(|(_, member)| may(member) && is_asked(member));
+            let asked = self.members.iter().enumerate().filter(|(_, member)| is_asked(member));
             best_camera(asked.map(|(number, member)| (number, &member.camera)), &scene.ego, detection)
         };
         best(&|member| member.works(scene)).or_else(|| best(&|_| true))
+    }
+
+    /// Returns the vehicles that only cameras see. Of several working cameras that find the same
+    /// vehicle at the same time, the camera that sees it best counts.
+    fn find_alone(&self, scene: &Scene<'_>) -> Vec<Detection> {
+        let mut found: Vec<(usize, &Detection)> = Vec::new();
+        for (number, member) in self.members.iter().enumerate().filter(|(_, member)| member.works(scene)) {
+            for seen in member.classifier.seen_alone() {
+                let is_same = |(other, earlier): &&mut (usize, &Detection)| {
+                    *other != number && member.sees_as_one(&scene.ego, [seen, earlier])
+                };
+                match found.iter_mut().find(is_same) {
+                    None => found.push((number, seen)),
+                    Some(earlier) => {
+                        let cameras = [earlier.0, number].map(|number| (number, &self.members[number].camera));
+                        if best_camera(cameras, &scene.ego, seen) == Some(number) {
+                            *earlier = (number, seen);
+                        }
+                    }
+                }
+            }
+        }
+        found.into_iter().map(|(_, seen)| seen.clone()).collect()
     }
 }
 
 impl DetectionClassifier for SeveralCameras {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        self.owners = detections.iter().map(|detection| self.owner(scene, detection, |_| true)).collect();
+        self.owners = detections.iter().map(|detection| self.owner(scene, detection)).collect();
         for (number, member) in self.members.iter_mut().enumerate() {
             // A network that reads the whole image has to know what other detections hide.
             let (is_all, owners) = (member.is_whole_image(), &self.owners);
@@ -84,13 +114,7 @@ impl DetectionClassifier for SeveralCameras {
                 }
             }
         }
-        // Several cameras may see the same vehicle alone.
-        let seen = self.members.iter().enumerate().flat_map(|(number, member)| {
-            member.classifier.seen_alone().iter().map(move |detection| (number, detection))
-        });
-        let owner = |detection: &Detection| self.owner(scene, detection, CameraMember::is_whole_image);
-        let alone = seen.filter(|(number, detection)| owner(detection) == Some(*number));
-        self.alone = alone.map(|(_, detection)| detection.clone()).collect();
+        self.alone = self.find_alone(scene);
         Ok(())
     }
 

@@ -3,9 +3,13 @@
 use closecall_traffic::{ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Time, VehicleClass};
 
 use crate::camera::{Camera, RearCamera, best_camera};
-use crate::faults::{CameraFaultConfig, FaultEntries, Faults};
+use crate::detection_classifier::DetectionClassifier;
+use crate::faults::{CameraFaultConfig, FaultEntries, FaultList, Faults};
+use crate::several_cameras::{CameraMember, SeveralCameras};
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
-use crate::{Alterations, Detection, Extent, Health, NoiseKey, Scene, SceneVehicle, SeenBy, SeenPart, SensorsConfig};
+use crate::{
+    Alterations, Detection, Extent, Health, NoiseKey, Scene, SceneVehicle, SeenBy, SeenPart, SensorError, SensorsConfig,
+};
 
 const EGO_S_M: f64 = 1_000.0;
 const LEFT_LANE_M: f64 = -1.875;
@@ -22,8 +26,35 @@ fn behind(gap_m: f64, d_m: f64) -> SceneVehicle {
     with_speed(scene_vehicle(1, VehicleClass::Car, s_m, d_m), 30.0)
 }
 
+/// Returns the detection of a car whose front is at this place behind the ego's middle.
+fn detection(back_m: f64, left_m: f64) -> Detection {
+    Detection {
+        time: Time::ZERO,
+        face_x_m: -back_m,
+        face_y_m: left_m,
+        range_sd_m: 0.1,
+        lateral_sd_m: 0.1,
+        heading_rad: 0.0,
+        length_m: 4.5,
+        length: Extent::Assumed,
+        width_m: 1.8,
+        width: Extent::Seen,
+        top_m: 1.5,
+        seen_by: SeenBy::Lidar,
+        points: 50,
+        is_centred: false,
+        seen: SeenPart::FACE,
+        class: ClassScores::UNKNOWN,
+    }
+}
+
 fn config(sensors: &str) -> SensorsConfig {
     toml::from_str(&format!("mode = \"full\"\nrear-lidar.false-alarm-rate = 0.0\n{sensors}")).unwrap()
+}
+
+fn cameras(text: &str) -> Vec<RearCamera> {
+    let sensors = config(text).check(&Parameters::default()).unwrap();
+    sensors.rear_cameras().map(|camera: &Camera| RearCamera::new(*camera)).collect()
 }
 
 fn faults(text: &str) -> Faults {
@@ -120,30 +151,9 @@ fn a_dead_camera_leaves_its_vehicles_to_the_other() {
 
 #[test]
 fn the_camera_that_shows_a_vehicle_whole_sees_it_best_and_else_the_one_with_more_pixels() {
-    let cameras = |text: &str| -> Vec<RearCamera> {
-        let sensors = config(text).check(&Parameters::default()).unwrap();
-        sensors.rear_cameras().map(|camera: &Camera| RearCamera::new(*camera)).collect()
-    };
     let best = |text: &str, [back_m, left_m]: [f64; 2]| {
         let ego = scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M);
-        let seen = Detection {
-            time: Time::ZERO,
-            face_x_m: -back_m,
-            face_y_m: left_m,
-            range_sd_m: 0.1,
-            lateral_sd_m: 0.1,
-            heading_rad: 0.0,
-            length_m: 4.5,
-            length: Extent::Assumed,
-            width_m: 1.8,
-            width: Extent::Seen,
-            top_m: 1.5,
-            seen_by: SeenBy::Lidar,
-            points: 50,
-            is_centred: false,
-            seen: SeenPart::FACE,
-            class: ClassScores::UNKNOWN,
-        };
+        let seen = detection(back_m, left_m);
         best_camera(cameras(text).iter().enumerate(), &ego, &seen)
     };
     let tele = "additional-rear-cameras = [{ name = \"tele\", field-of-view-deg = 20 }]";
@@ -155,4 +165,47 @@ fn the_camera_that_shows_a_vehicle_whole_sees_it_best_and_else_the_one_with_more
     assert_eq!(best(tele, [-10.0, 0.0]), None);
     let fine = "additional-rear-cameras = [{ name = \"fine\", resolution = { width-px = 2560, height-px = 1600 } }]";
     assert_eq!(best(fine, [40.0, 0.0]), Some(1));
+}
+
+/// A camera that finds these vehicles, to which no cluster belongs.
+struct Finds(Vec<Detection>, Health);
+
+impl DetectionClassifier for Finds {
+    fn classify(&mut self, _: &Scene<'_>, _: &mut [Detection]) -> Result<(), SensorError> {
+        Ok(())
+    }
+
+    fn seen_alone(&self) -> &[Detection] {
+        &self.0
+    }
+
+    fn health(&self) -> Health {
+        self.1
+    }
+}
+
+#[test]
+fn a_vehicle_that_only_one_of_two_cameras_finds_without_a_cluster_is_kept() {
+    let tele = "additional-rear-cameras = [{ name = \"tele\", field-of-view-deg = 20 }]";
+    let found_with = |sensors: &str, healths: [Health; 2], finds: [&[[f64; 2]]; 2]| {
+        let of = |((camera, finds), health): ((RearCamera, &[[f64; 2]]), Health)| {
+            let finds = finds.iter().map(|[back_m, left_m]| detection(*back_m, *left_m)).collect();
+            CameraMember { camera, faults: FaultList::default(), classifier: Box::new(Finds(finds, health)) }
+        };
+        let mut several = SeveralCameras::new(cameras(sensors).into_iter().zip(finds).zip(healths).map(of).collect());
+        let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+        let ego = scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &[] };
+        several.classify(&scene, &mut []).unwrap();
+        several.seen_alone().iter().map(|seen| [-seen.face_x_m, seen.face_y_m]).collect::<Vec<_>>()
+    };
+    let found = |finds: [&[[f64; 2]]; 2]| found_with(tele, [Health::Ok; 2], finds);
+    assert_eq!(found([&[[50.0, 0.0]], &[]]), [[50.0, 0.0]], "the second camera sees it better, and misses it");
+    assert_eq!(found([&[], &[[50.0, 0.0]]]), [[50.0, 0.0]]);
+    assert_eq!(found([&[[50.0, 0.1]], &[[55.0, 0.0]]]), [[55.0, 0.0]], "both find it, the second sees it better");
+    assert_eq!(found([&[[20.0, 3.0]], &[[21.0, 3.0]]]), [[20.0, 3.0]], "the first shows it whole");
+    assert_eq!(found([&[[40.0, 3.75]], &[[40.0, 0.0]]]), [[40.0, 3.75], [40.0, 0.0]], "two vehicles");
+    let beside = [[8.0, -3.9]];
+    assert_eq!(found_with(TWINS, [Health::Ok; 2], [&beside, &beside]), beside, "cut off by the edge of the image");
+    assert!(found_with(tele, [Health::Failed, Health::Ok], [&[[50.0, 0.0]], &[]]).is_empty(), "a failed camera");
 }
