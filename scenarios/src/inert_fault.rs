@@ -4,10 +4,13 @@ use closecall_sensors::camera::{Camera, Pipeline};
 use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road, maths};
+use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road};
 
 use super::inert_object_fault::{refuse_of_map, refuse_of_objects, refuse_of_radars};
 use super::intervention::FaultConfig;
+
+/// Why a fault of a camera whose images nothing gets is refused.
+const NOT_USED: &str = "a camera whose pipeline is off is not used";
 
 /// Refuses faults that cannot act: faults of sensors that do not exist in the mode of the scenario,
 /// of a front radar that a LiDAR replaces, and of a LiDAR or a camera that does not exist, blocked
@@ -92,6 +95,11 @@ fn without_sensor(kind: &str, names: &[&str]) -> ConfigError {
     ConfigError::new("sensor", Problem::Contradiction { other: "sensors", rule })
 }
 
+/// Returns whether a network of Closecall or a perception program gets the images of a camera.
+fn is_used(camera: &Camera, sensors: &Sensors) -> bool {
+    camera.pipeline != Pipeline::Off || sensors.program().is_some_and(|program| program.images.is_some())
+}
+
 /// Refuses names that no camera has, and names of cameras that are not used.
 fn refuse_of_cameras(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigError> {
     let cameras: Vec<&Camera> = sensors.rear_cameras().collect();
@@ -99,9 +107,7 @@ fn refuse_of_cameras(fault: &FaultConfig, sensors: &Sensors) -> Result<(), Confi
         let Some(name) = &entry.sensor else { continue };
         let error = match cameras.iter().find(|camera| camera.name == name) {
             None => without_sensor("camera", &cameras.iter().map(|camera| camera.name).collect::<Vec<_>>()),
-            Some(camera) if camera.pipeline == Pipeline::Off => {
-                contradiction("sensor", "sensors", "a camera whose pipeline is off is not used")
-            }
+            Some(camera) if !is_used(camera, sensors) => contradiction("sensor", "sensors", NOT_USED),
             Some(_) => continue,
         };
         return Err(at("rear-camera", index, error));
@@ -114,21 +120,22 @@ fn refuse_glare(
     fault: &FaultConfig,
     (sensors, road, environment): (&Sensors, &Road, &Environment),
 ) -> Result<(), ConfigError> {
-    let sun = sensors.camera().sun;
-    // On a curved road, the sun is behind the ego sooner or later.
-    let is_ahead = road.is_straight() && maths::cos(sun.azimuth_rad) * maths::cos(sun.elevation_rad) >= 0.0;
     let is_day = environment.light == Light::Day;
     for (index, entry) in fault.rear_camera.iter().enumerate() {
         let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, sensor, .. } = entry.clone();
         let of_sun = CameraFaultConfig { sun_glare, from_s, until_s, sensor, ..CameraFaultConfig::default() };
         let of_beam = CameraFaultConfig { main_beam_glare, sun_glare: None, ..of_sun.clone() };
+        let has_fault = |camera: &&Camera| entry.sensor.as_ref().is_none_or(|sensor| camera.name == sensor);
+        let mut cameras = sensors.rear_cameras().filter(has_fault).filter(|camera| is_used(camera, sensors));
+        // On a curved road, the sun is in front of the lens sooner or later.
+        let is_averted = road.is_straight() && !cameras.any(Camera::faces_sun);
         let inert = [
             (*entry == of_sun && !is_day, "sun-glare", "environment.light", "the sun shines by day only"),
             (
-                *entry == of_sun && is_ahead,
+                *entry == of_sun && is_averted,
                 "sun-glare",
                 "sensors.rear-camera.sun",
-                "a sun ahead of the ego does not shine into its rear camera: its azimuth is beyond 1.58 rad to either side",
+                "the sun does not shine into a camera that faces away from it: for a camera that looks straight back, its azimuth is beyond 1.58 rad to either side",
             ),
             (
                 *entry == of_beam && is_day,
@@ -158,8 +165,7 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
     let radar_only = "the rear radars exist in mode `full` only";
     let object_only = "the object-level sensor behind exists in mode `object` only";
     let no_sensor = "mode `ground-truth` has no sensor that can fail";
-    let is_off = |camera: &Camera| camera.pipeline == Pipeline::Off;
-    let cameras_are_off = mode == SensorMode::Full && sensors.rear_cameras().all(is_off);
+    let cameras_are_off = mode == SensorMode::Full && !sensors.rear_cameras().any(|camera| is_used(camera, sensors));
     let is_truth = mode == SensorMode::GroundTruth;
     let absent = [
         (has_lidar && mode != SensorMode::Full && !is_for_both, "rear-lidar", MODE, full_only),
@@ -187,12 +193,7 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
             "sensors.front-lidar",
             "in mode `full`, a LiDAR looks ahead in place of the radar: its faults belong to `fault.front-lidar`",
         ),
-        (
-            has_camera && cameras_are_off,
-            "rear-camera",
-            "sensors.rear-camera.pipeline",
-            "a camera whose pipeline is off is not used",
-        ),
+        (has_camera && cameras_are_off, "rear-camera", "sensors.rear-camera.pipeline", NOT_USED),
     ];
     match absent.into_iter().find(|(is_absent, ..)| *is_absent) {
         Some((_, key, other, rule)) => Err(contradiction(key, other, rule).within("fault")),
@@ -258,6 +259,11 @@ mod tests {
         let (sun, beam) =
             ("[[fault.rear-camera]]\nsun-glare = 1.0\n", "[[fault.rear-camera]]\nmain-beam-glare = 1.0\n");
         let (low_sun, night) = ("sensors.rear-camera.sun.azimuth-rad = 3.1\n", "environment.light = \"night\"\n");
+        // The sun stands 85° to the left, and 100° to the right.
+        let (left_sun, right_sun) =
+            ("sensors.rear-camera.sun.azimuth-rad = 1.48\n", "sensors.rear-camera.sun.azimuth-rad = -1.75\n");
+        let to_left = "sensors.additional-rear-cameras = [{ name = \"left\", yaw-deg = 50 }]\n";
+        let images = "sensors.perception = \"exec:x\"\nsensors.perception-image-hz = 5\n";
         let is_off = "sensors.rear-camera.pipeline = \"off\"\n";
         let mirrors = "[[fault.rear-lidar]]\nrail-ghosts = 0.5\n";
         for (keys, key, why) in [
@@ -334,6 +340,11 @@ mod tests {
                 "fault.rear-camera[0].sun-glare",
                 "`sensors.rear-camera.sun`",
             ),
+            (
+                format!("{full}{to_left}{right_sun}{sun}sensor = \"left\"\n"),
+                "fault.rear-camera[0].sun-glare",
+                "`sensors.rear-camera.sun`",
+            ),
             (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
             (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
             (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
@@ -350,7 +361,11 @@ mod tests {
         for keys in [
             format!("{full}{lidar}{camera}{radar}"),
             format!("{full}{is_off}{second}{camera}sensor = \"left\"\n"),
+            format!("{full}{is_off}{images}{camera}"),
+            format!("{full}{is_off}{images}{second}{camera}sensor = \"rear-camera\"\n"),
             format!("{full}{low_sun}{sun}"),
+            format!("{full}{to_left}{left_sun}{sun}sensor = \"left\"\n"),
+            format!("{full}{to_left}{right_sun}{sun}"),
             format!("{full}{night}{beam}"),
             format!("{full}{sun}dirt = 0.1\n"),
             format!("{full}{further}{lidar}sensor = \"left\"\n"),

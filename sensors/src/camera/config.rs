@@ -213,6 +213,15 @@ impl Named for Camera {
     }
 }
 
+impl Camera {
+    /// Returns whether the sun is in front of the lens while the ego drives along a straight road.
+    pub fn faces_sun(&self) -> bool {
+        let Sun { azimuth_rad, elevation_rad } = self.sun;
+        let behind = -maths::cos(elevation_rad) * maths::cos(azimuth_rad + self.yaw_rad);
+        maths::cos(self.pitch_rad) * behind - maths::sin(self.pitch_rad) * maths::sin(elevation_rad) > 0.0
+    }
+}
+
 impl Check for CameraConfig {
     type Checked = Camera;
 
