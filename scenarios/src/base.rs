@@ -64,16 +64,10 @@ fn remove_unused(whole: &mut DocumentMut, file: &DocumentMut) {
     }
 }
 
-/// Turns an error in the whole text into an error in the text that names the base. Its line becomes
-/// the line of that text with the same words. If only the base has these words, it becomes the line
-/// of the key `base`. An error in another file, such as a pattern of a LiDAR, stays as it is.
+/// Turns an error in the whole text into an error in the text that names the base. An error in
+/// another file, such as a pattern of a LiDAR, stays as it is.
 pub(super) fn located(error: ScenarioError, own: &Path, whole: &str, text: &str) -> ScenarioError {
-    let line_of = |line: usize| {
-        let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
-        let is_same = |line: &str| line.trim() == words;
-        let own_line = text.lines().position(is_same).filter(|_| !words.is_empty());
-        own_line.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
-    };
+    let line_of = |line: usize| own_line(line, whole, text);
     match error {
         ScenarioError::Syntax { path, line, message } if path == own => {
             ScenarioError::Syntax { path, line: line_of(line), message }
@@ -83,6 +77,14 @@ pub(super) fn located(error: ScenarioError, own: &Path, whole: &str, text: &str)
         }
         other => other,
     }
+}
+
+/// Turns a line of the whole text into a line of the text that names the base: the line with the
+/// same words or, if only the base has these words, the line of the key `base`.
+pub(super) fn own_line(line: usize, whole: &str, text: &str) -> usize {
+    let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
+    let own = text.lines().position(|line| line.trim() == words).filter(|_| !words.is_empty());
+    own.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
 }
 
 /// Replaces the values of `target` by the values of `source`, and merges tables.
@@ -137,6 +139,17 @@ mod tests {
         let text = "base = \"low-thw-overtake\"\nname = \"own\"\n\n[[fault.rear-lidar]]\ndrop-out = 0.5\n";
         let error = parse(text).unwrap_err();
         assert!(error.contains("own.toml:5") && error.contains("drop-out"), "{error}");
+        let line = |keys: &str| {
+            let file = parse(&format!("base = \"low-thw-overtake\"\nname = \"own\"\n{keys}")).unwrap();
+            file.check().and_then(|()| file.refuse_unused()).unwrap_err().line()
+        };
+        assert_eq!(line("\n[sensors.rear-camera]\nyaw-deg = 90\n"), Some(5), "a value out of range");
+        assert_eq!(line("[parameters]\nx = { uniform = { min = 0, max = 1 } }\n"), Some(4), "an unused parameter");
+        assert_eq!(
+            line("parameters.cruise-mps = { uniform = { min = -90, max = -80 } }\n"),
+            Some(1),
+            "words of the base only"
+        );
     }
 
     #[test]

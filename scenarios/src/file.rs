@@ -145,6 +145,8 @@ impl ScenarioError {
 pub struct ScenarioFile {
     path: PathBuf,
     text: String,
+    /// The text that names a base, if the text above comes from one.
+    own_text: Option<String>,
     config: ScenarioConfig,
     space: ParameterSpace,
     coverage: CoveragePlan,
@@ -192,7 +194,9 @@ impl ScenarioFile {
         match base::expand(text) {
             Ok(None) => Self::parse_whole(path, text, settings),
             Ok(Some(whole)) => {
-                Self::parse_whole(path, &whole, settings).map_err(|error| base::located(error, path, &whole, text))
+                let parsed = Self::parse_whole(path, &whole, settings);
+                let file = parsed.map_err(|error| base::located(error, path, &whole, text))?;
+                Ok(Self { own_text: Some(text.to_owned()), ..file })
             }
             Err(message) => Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message }),
         }
@@ -252,6 +256,7 @@ impl ScenarioFile {
         Ok(Self {
             path: path.to_owned(),
             text,
+            own_text: None,
             config,
             space: space.with_strata(strata),
             coverage,
@@ -375,11 +380,9 @@ impl ScenarioFile {
         if self.unused.is_some() && self.names_a_missing_parameter() {
             self.concrete(&self.space.nominal())?;
         }
-        let Some(name) = self.unused else { return Ok(self) };
-        let line = locate::line_of(
-            &self.text,
-            &KeyPath(["parameters", name.as_str()].map(|key| Segment::Key(key.to_owned())).into()),
-        );
+        let Some(name) = self.unused.clone() else { return Ok(self) };
+        let key = KeyPath(["parameters", name.as_str()].map(|key| Segment::Key(key.to_owned())).into());
+        let line = self.line_of(&key);
         Err(ScenarioError::UnusedParameter { path: self.path, line, name })
     }
 
@@ -435,8 +438,14 @@ impl ScenarioFile {
 
     /// Returns an error with its place in the file. `at` says when it holds.
     pub(super) fn located(&self, source: ConfigError, at: String) -> ScenarioError {
-        let line = locate::line_of(&self.text, &source.path);
+        let line = self.line_of(&source.path);
         ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at }
+    }
+
+    /// Returns the line of a key in the file, counted from 1.
+    fn line_of(&self, path: &KeyPath) -> Option<usize> {
+        let line = locate::line_of(&self.text, path)?;
+        Some(self.own_text.as_ref().map_or(line, |own| base::own_line(line, &self.text, own)))
     }
 
     /// Checks the scenario with the median of every parameter, with each parameter at each of its
