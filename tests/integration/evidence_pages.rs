@@ -131,3 +131,18 @@ fn every_scenario_of_the_library_is_in_the_tables() {
     assert!(members.len() >= 3 * 6 && members.iter().all(|row| row.len() == 10), "{members:?}");
     assert!(members.iter().any(|row| row[0] == "`low-thw-overtake`" && row[1] == "`mis`"), "{members:?}");
 }
+
+#[test]
+fn the_readme_says_where_the_system_fails_by_the_figures_of_the_tables() {
+    let readme = std::fs::read_to_string(PathBuf::from(ROOT).join("README.md")).unwrap();
+    let (_, failures) = readme.split_once("**Where the system fails**").unwrap();
+    let words: Vec<&str> = failures.split_whitespace().collect();
+    let failures = words.join(" ");
+    let listed = [rows(&committed(Section::Scenarios)), rows(&committed(Section::Traffic))].concat();
+    for scenario in ["rear-vehicles-one-after-another", "rear-vehicle-is-followed", "busy-overtake"] {
+        let row = listed.iter().find(|row| row[0] == format!("`{scenario}`") && row[1] == "`mis`").unwrap();
+        let (_, text) = failures.split_once(&format!("{scenario}`) ")).unwrap_or_else(|| panic!("no {scenario}"));
+        let prevented = format!("{} of {}", row[5], row[3]);
+        assert!(text.starts_with(&prevented) || text.starts_with(&format!("it prevents {prevented}")), "{row:?}");
+    }
+}
