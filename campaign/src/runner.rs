@@ -81,7 +81,7 @@ impl Samples for Work {
     fn run(&self, sample: u64, index: usize, limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun {
         let arm = &self.arms[index];
         if arm.controller.isolated().is_some() {
-            return host::run(self, index, sample, limit);
+            return host::run((self, index, sample), limit, on_outcome);
         }
         let mut done = None;
         arm.controller.in_thread(&mut || done = Some(self.run_here(sample, arm, on_outcome)));

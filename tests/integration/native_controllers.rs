@@ -234,6 +234,20 @@ fn a_library_whose_answers_depend_on_its_process_makes_the_campaign_invalid() {
 }
 
 #[test]
+fn a_library_that_one_process_at_a_time_may_use_is_checked() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let out = folder.path().join("out");
+    let mut command = program();
+    command
+        .args(["campaign", "low-thw-overtake", "-n", "4", "--sensors", "object", "--no-gate", "--jobs", "1"])
+        .args(["--controller", &library, "--out", out.to_str().unwrap()])
+        .env("LICENCE", folder.path().join("licence"));
+    let printed = stdout(&with_fault(&mut command, None), 0);
+    assert!(printed.contains("checked: 2 runs, 0 flipped") && !printed.contains("no licence"), "{printed}");
+}
+
+#[test]
 fn a_run_and_a_campaign_say_the_same_about_a_library_that_ends_its_process() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));

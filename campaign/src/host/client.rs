@@ -14,8 +14,8 @@ use closecall_simulation::perception::hosted;
 use super::{Answer, Question, Refusal, Task, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, Flaky, SampleFailure};
-use crate::runner::{ArmRun, Work};
-use crate::validity::{ALWAYS_CHECKED, CheckPlan, Invariance};
+use crate::runner::{ArmRun, OnOutcome, Work};
+use crate::validity::{ALWAYS_CHECKED, ArmChecks, Invariance};
 
 /// The kind of a failure of the controller.
 const KIND: &str = "controller";
@@ -96,9 +96,9 @@ pub(super) enum Trouble {
 }
 
 /// Runs one sample of an isolated arm in a worker process of this thread. `limit` is the time limit
-/// of the sample.
-pub(crate) fn run(work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
-    CLIENT.with_borrow_mut(|client| client.run(work, arm, sample, limit))
+/// of the sample. `on_outcome` gets the result before the run is repeated, if it is.
+pub(crate) fn run(run: (&Work, usize, u64), limit: Duration, on_outcome: &OnOutcome<'_>) -> ArmRun {
+    CLIENT.with_borrow_mut(|client| client.run(run, limit, on_outcome))
 }
 
 /// Ends the worker processes that this thread has for a work whose samples are all done.
@@ -108,9 +108,8 @@ pub(crate) fn end(work: &Work) {
 
 impl Client<OperatingSystem> {
     fn end(&mut self, work: &Work) {
-        let address = std::ptr::from_ref(work) as usize;
         for (index, arm) in work.arms.iter().enumerate() {
-            let Some(mut worker) = self.workers.remove(&(address, index)) else { continue };
+            let Some(mut worker) = self.workers.remove(&key(work, index)) else { continue };
             let name = arm.controller.name();
             if let Err(error) = worker.peer.finish_unloading(name) {
                 keep_left_over(name, &error);
@@ -129,23 +128,26 @@ impl<W: World> Client<W> {
     ///
     /// A process that crashes or hangs costs the sample that it runs. Only if the work says so is
     /// the sample run again in a new process, and its record then says that it is flaky.
-    pub(super) fn run(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> ArmRun {
+    pub(super) fn run(
+        &mut self,
+        (work, arm, sample): (&Work, usize, u64),
+        limit: Duration,
+        on_outcome: &OnOutcome<'_>,
+    ) -> ArmRun {
         let started = self.world.now();
         let mut first: Option<SampleFailure> = None;
         let mut crashes = 0;
         let failure = loop {
             let left = limit.saturating_sub(self.world.now() - started);
-            match self.ask(work, arm, sample, left) {
+            match self.ask((work, arm, sample), left, false) {
                 // The message does not depend on the time that the process has taken to start.
                 Err(Trouble::Late) => break SampleError::Timeout { limit_s: limit.as_secs_f64() }.into(),
                 Ok(Answer { record, wall_s, check_s, .. }) => {
-                    let asked = self.world.now();
                     let flaky = first.map(|first| Flaky { crashes, first });
-                    let record = ArmRecord { flaky, ..record };
-                    let record =
-                        self.repeat_in_new_process((work, arm, sample), record, limit.saturating_sub(asked - started));
-                    let repeated_s = (self.world.now() - asked).as_secs_f64();
-                    return ArmRun { record, wall_s, check_s: check_s + repeated_s };
+                    let mut run = ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
+                    let left = limit.saturating_sub(self.world.now() - started);
+                    self.repeat_in_new_process((work, arm, sample), &mut run, left, on_outcome);
+                    return run;
                 }
                 Err(Trouble::Other(failure)) => break failure,
                 Err(Trouble::Crash(failure)) => {
@@ -167,37 +169,46 @@ impl<W: World> Client<W> {
     /// Runs one of the first samples again in a new process, if it is checked, and notes a different
     /// outcome. A controller whose answers depend on its process, such as on its number or on its
     /// environment, repeats itself in one process. `limit` is the time that is left.
+    ///
+    /// The first process ends before: a licence or a device may serve one process at a time.
     fn repeat_in_new_process(
         &mut self,
         (work, arm, sample): (&Work, usize, u64),
-        mut record: ArmRecord,
+        run: &mut ArmRun,
         limit: Duration,
-    ) -> ArmRecord {
-        let (Ok(outcome), Some(checks)) = (&record.result, &mut record.checks) else { return record };
-        let is_repeatable = checks.not_checked.is_none() && !checks.broken.contains(&Invariance::Repetition);
-        if sample >= ALWAYS_CHECKED || !is_repeatable {
-            return record;
+        on_outcome: &OnOutcome<'_>,
+    ) {
+        let is_repeatable =
+            |checks: &ArmChecks| checks.not_checked.is_none() && !checks.broken.contains(&Invariance::Repetition);
+        if sample >= ALWAYS_CHECKED || !run.record.checks.as_ref().is_some_and(is_repeatable) {
+            return;
         }
-        let again = Work { checks: CheckPlan::off(), ..work.clone() };
-        let answer = self.ask(&again, arm, sample, limit);
-        // The process has no other sample to run.
-        self.workers.remove(&(std::ptr::from_ref(&again) as usize, arm));
+        on_outcome(run);
+        let started = self.world.now();
+        drop(self.workers.remove(&key(work, arm)));
+        let answer = self.ask((work, arm, sample), limit, true);
+        run.check_s += (self.world.now() - started).as_secs_f64();
+        let (Ok(outcome), Some(checks)) = (&run.record.result, &mut run.record.checks) else { return };
         let failure = match answer.map(|answer| answer.record.result) {
             Ok(Ok(again)) => {
                 checks.broken.extend((!again.has_same_bits(outcome)).then_some(Invariance::Repetition));
-                return record;
+                return;
             }
             Ok(Err(failure)) | Err(Trouble::Crash(failure) | Trouble::Other(failure)) => failure.message,
             Err(Trouble::Late) => "the time of the sample is over".to_owned(),
         };
         checks.not_checked = Some(format!("{}: {failure}", Invariance::Repetition.name()));
-        record
     }
 
     /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process
     /// that has answered is kept. `limit` is the time that is left.
-    fn ask(&mut self, work: &Work, arm: usize, sample: u64, limit: Duration) -> Result<Answer, Trouble> {
-        let key = (std::ptr::from_ref(work) as usize, arm);
+    fn ask(
+        &mut self,
+        (work, arm, sample): (&Work, usize, u64),
+        limit: Duration,
+        is_repetition: bool,
+    ) -> Result<Answer, Trouble> {
+        let key = key(work, arm);
         let mut worker = match self.workers.remove(&key) {
             Some(worker) => worker,
             None => {
@@ -206,7 +217,7 @@ impl<W: World> Client<W> {
             }
         };
         worker.asked += 1;
-        let question = Question { task: worker.task.clone(), arm, sample, number: worker.asked };
+        let question = Question { task: worker.task.clone(), arm, sample, number: worker.asked, is_repetition };
         let answer = match worker.peer.request_within(line(&question), limit) {
             Ok(Some(line)) => self.world.read(work, &question, &line),
             Ok(None) => Err(Trouble::Late),
@@ -223,6 +234,11 @@ impl<W: World> Client<W> {
         }
         answer
     }
+}
+
+/// Returns the key of a process.
+fn key(work: &Work, arm: usize) -> (usize, usize) {
+    (std::ptr::from_ref(work) as usize, arm)
 }
 
 /// Reads the answer to a question, and checks that it is one.

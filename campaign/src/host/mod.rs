@@ -115,11 +115,13 @@ struct Question {
     sample: u64,
     /// The number of the question to this process, from 1 on.
     number: u64,
+    /// Whether the run only repeats the sample, without checks.
+    is_repetition: bool,
 }
 
 impl fmt::Display for Question {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { task, arm, sample, number } = self;
+        let Self { task, arm, sample, number, .. } = self;
         write!(f, "question {number} (sample {sample}, arm {arm}, task {task})")
     }
 }

@@ -23,6 +23,7 @@ use super::{Answer, CHANGED, Question, Task, UNREADABLE, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
+use crate::validity::CheckPlan;
 use crate::workers::Samples;
 
 /// The answer of a process that has loaded ONNX Runtime.
@@ -134,6 +135,7 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
     let file = file.with_program_in(task.program_folder.as_deref().map(Path::new));
     let arms = vec![Arm { controller, sensors: task.sensors }];
     let work = Work { file, sampling: task.sampling, arms, checks: task.checks, retry_crashed: 0 };
+    let unchecked = Work { checks: CheckPlan::off(), ..work.clone() };
     let is_answered = Arc::new(AtomicBool::new(true));
     let current: Arc<Mutex<Current>> = Arc::default();
     let answering = Answering { answers: answers.clone(), process: std::process::id() };
@@ -169,7 +171,8 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
         io::stderr().write_all(&[NEW_SAMPLE]).map_err(|error| error.to_string())?;
         *lock(&current) = Current { question: Some(question.clone()), outcome: None };
         is_answered.store(false, Ordering::SeqCst);
-        let run = work.run(question.sample, 0, limit, &|run| lock(&current).outcome = Some(run.clone()));
+        let asked = if question.is_repetition { &unchecked } else { &work };
+        let run = asked.run(question.sample, 0, limit, &|run| lock(&current).outcome = Some(run.clone()));
         if !is_answered.swap(true, Ordering::SeqCst) {
             answering.answer(Some(question), run, false)?;
         }

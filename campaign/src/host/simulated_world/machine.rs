@@ -119,7 +119,7 @@ impl SampleRunner for Machine {
             }
             let run = |arm: usize| {
                 lock(&self.state).crashes = 0;
-                let mut run = self.client.lock().unwrap().run(work, arm, sample, LIMIT);
+                let mut run = self.client.lock().unwrap().run((work, arm, sample), LIMIT, &|_| ());
                 if self.reader == Reader::Silent {
                     run.record.flaky = None;
                 }
