@@ -136,7 +136,8 @@ pub fn positive(text: &str) -> Result<f64, String> {
 pub fn count(text: &str) -> Result<u64, String> {
     let reason = match text.parse::<i128>() {
         Ok(number) if number > 0 => {
-            return u64::try_from(number).map_err(|_| format!("`{text}` is too large: at most {} is allowed", u64::MAX));
+            return u64::try_from(number)
+                .map_err(|_| format!("`{text}` is too large: at most {} is allowed", u64::MAX));
         }
         Ok(0) => "is too small",
         Ok(_) => "is negative",
