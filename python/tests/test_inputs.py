@@ -42,7 +42,7 @@ import closecall.gym as ccgym
         ({"record": "best"}, "record=: `best` is not"),
         ({"record": "worst:2"}, "record: the files are kept in the folder of the campaign: name one with `out`"),
         ({"partition": "1/2"}, "partition: the files are kept in the folder of the campaign: name one with `out`"),
-        ({"check_share": 1.5}, "check_share=: `1.5` is not a number from 0 to 1"),
+        ({"check_share": 1.5}, "check_share=: `1.5` is not a number above 0 and up to 1"),
         ({"retry_crashed": 101}, "retry_crashed=: `101` is not a whole number from 0 to 100"),
         ({"paired": "yes"}, "paired=: \"yes\" is not allowed: expected True or False"),
         ({"max_induced": -1}, "max_induced=: `-1` is not allowed: expected a whole number, 0 or more"),
