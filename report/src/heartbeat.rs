@@ -116,6 +116,9 @@ pub fn duration_text(seconds: f64) -> String {
 
 fn line([done, all]: [u64; 2], unit: &str, elapsed: Duration) -> String {
     let elapsed_s = elapsed.as_secs_f64();
+    if done >= all {
+        return format!("all {all} {unit} are done, the results are written: {} so far", duration_text(elapsed_s));
+    }
     let per_second = done as f64 / elapsed_s;
     let left = match done {
         0 => String::new(),
@@ -145,6 +148,10 @@ mod tests {
         );
         assert_eq!(line([0, 200], "samples", Duration::from_secs(30)), "0 of 200 samples after 30 s");
         assert_eq!(line([3, 6], "fits", Duration::from_secs(3)), "3 of 6 fits after 3 s, 1.0 fits/s, 3 s left");
+        assert_eq!(
+            line([200, 200], "samples", Duration::from_secs(40)),
+            "all 200 samples are done, the results are written: 40 s so far"
+        );
     }
 
     #[test]
