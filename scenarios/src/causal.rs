@@ -16,6 +16,7 @@ use closecall_traffic::{ActorId, Time};
 
 use super::Scenario;
 use crate::outcome::{Collision, MisSummary, Moment, Outcome, ReachedMoment};
+use crate::promise::SHORTFALL_S;
 
 /// The key of [`VehicleLetters`], for every output that uses them.
 pub const LETTERS: &str = "E is the ego, F the lead vehicle, R the rear vehicle";
@@ -88,6 +89,8 @@ pub struct CausalSentence<'a> {
     /// The vehicle for which the MIS engaged, in words, if that is known: its letter or name, or
     /// that it does not exist.
     pub engaged_for: Option<&'a str>,
+    /// The front time headway that the MIS is to gain (s), if the arm has one.
+    pub goal_s: Option<f64>,
 }
 
 impl CausalSentence<'_> {
@@ -180,12 +183,29 @@ impl CausalSentence<'_> {
     /// Returns how long before or after the braking the MIS engaged, and how much it could do.
     fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
         let when = self.since_braking(engaged_at_s);
-        let gained = match (mis.thw_front_at_engagement_s, mis.thw_front_at_critical_s) {
-            (Ok(before_s), Ok(after_s)) => format!(", front headway {before_s:.2} to {after_s:.2} s"),
+        let headways_s = mis.thw_front_at_engagement_s.and_then(|before_s| Ok([before_s, mis.thw_front_at_critical_s?]));
+        let gained = headways_s.map_or_else(
+            |_| String::new(),
+            |[before_s, after_s]| format!(", front headway {before_s:.2} to {after_s:.2} s"),
+        );
+        let goal = match mis.reason {
+            Reason::EngagedGoalOutOfReach => self.missed_goal(headways_s.ok()),
             _ => String::new(),
         };
-        let goal = if mis.reason == Reason::EngagedGoalOutOfReach { ", its goal out of reach" } else { "" };
         format!("{when}{gained}{goal}")
+    }
+
+    /// Returns the goal that was out of reach when the MIS engaged, and by how much the headway at
+    /// the critical distance misses it; nothing if the headway reaches it all the same.
+    /// `headways_s` are the headways at the engagement and at the critical distance.
+    fn missed_goal(&self, headways_s: Option<[f64; 2]>) -> String {
+        let Some(goal_s) = self.goal_s else { return ", its goal out of reach".to_owned() };
+        let missing_s = headways_s.map(|[before_s, after_s]| goal_s - (after_s - before_s));
+        match missing_s {
+            Some(missing_s) if missing_s < SHORTFALL_S => String::new(),
+            Some(missing_s) => format!(", {missing_s:.2} s short of its goal of +{goal_s} s, which was out of reach"),
+            None => format!(", its goal of +{goal_s} s out of reach"),
+        }
     }
 
     /// Returns the faults that began before the first collision, or in the run.
@@ -198,11 +218,15 @@ impl CausalSentence<'_> {
 }
 
 /// Returns the sentence about a run of a scenario, in which the command line may have set the mode
-/// of the sensors.
-pub fn causal_sentence(scenario: &Scenario, sensors: Option<SensorMode>, outcome: &Outcome) -> String {
+/// of the sensors. `goal_s` is the front time headway that the MIS of the arm is to gain (s).
+pub fn causal_sentence(
+    scenario: &Scenario,
+    (sensors, goal_s): (Option<SensorMode>, Option<f64>),
+    outcome: &Outcome,
+) -> String {
     let faults = sensors.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode)).stated_faults();
     let letters = VehicleLetters::of(scenario);
-    CausalSentence { outcome, letters: &letters, faults: &faults, engaged_for: None }.to_string()
+    CausalSentence { outcome, letters: &letters, faults: &faults, engaged_for: None, goal_s }.to_string()
 }
 
 impl CausalSentence<'_> {
@@ -315,7 +339,7 @@ mod tests {
     }
 
     fn sentence(outcome: &Outcome, faults: &[StatedFault]) -> String {
-        CausalSentence { outcome, letters: &letters(), faults, engaged_for: None }.to_string()
+        CausalSentence { outcome, letters: &letters(), faults, engaged_for: None, goal_s: Some(2.0) }.to_string()
     }
 
     #[test]
@@ -372,8 +396,9 @@ mod tests {
     fn an_engagement_for_a_vehicle_that_does_not_exist_says_so() {
         let mut run = outcome(Vec::new(), Reason::Engaged);
         run.mis.as_mut().unwrap().engaged_at_s = Ok(2.0);
+        let (letters, goal_s) = (letters(), None);
         let told =
-            |engaged_for| CausalSentence { outcome: &run, letters: &letters(), faults: &[], engaged_for }.reason();
+            |engaged_for| CausalSentence { outcome: &run, letters: &letters, faults: &[], engaged_for, goal_s }.reason();
         assert_eq!(
             told(Some("a vehicle that does not exist")),
             "the MIS engaged for a vehicle that does not exist at 2.0 s, 7.0 s before F braked; faults: none"
@@ -410,6 +435,23 @@ mod tests {
         let told = sentence(&run, &[]);
         let expected = "before F braked; not sooner: vehicle behind not seen in the lane, 2.7 to 6.2 s; faults: none";
         assert!(told.ends_with(expected), "{told}");
+    }
+
+    #[test]
+    fn a_goal_out_of_reach_says_how_much_was_missing() {
+        let told = |after_s| {
+            let mut run = outcome(Vec::new(), Reason::EngagedGoalOutOfReach);
+            let mis = run.mis.as_mut().unwrap();
+            mis.engaged_at_s = Ok(6.2);
+            mis.thw_front_at_engagement_s = Ok(0.75);
+            mis.thw_front_at_critical_s = after_s;
+            let told = sentence(&run, &[]);
+            told.split("F braked").last().unwrap().trim_end_matches("; faults: none").to_owned()
+        };
+        let short = ", front headway 0.75 to 1.50 s, 1.25 s short of its goal of +2 s, which was out of reach";
+        assert_eq!(told(Ok(1.5)), short);
+        assert_eq!(told(Err(Absent::NeverCritical)), ", its goal of +2 s out of reach");
+        assert_eq!(told(Ok(3.0)), ", front headway 0.75 to 3.00 s", "it gained more than it had foreseen");
     }
 
     #[test]

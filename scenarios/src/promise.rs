@@ -22,7 +22,7 @@ pub const GOAL_GAIN_S: f64 = 2.0;
 
 /// Largest shortfall with which the goal counts as reached (s): the shortfall of the plan, and one
 /// control step of rounding.
-const SHORTFALL_S: f64 = 0.1;
+pub(crate) const SHORTFALL_S: f64 = 0.1;
 const _: () = assert!(GOAL_TOLERANCE_S < SHORTFALL_S);
 
 /// Braking of the ego around the crossing above which it counts as hard (m/s²): an assumption,

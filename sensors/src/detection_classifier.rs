@@ -20,6 +20,12 @@ pub trait DetectionClassifier: Send {
         Vec::new()
     }
 
+    /// Returns the names of the cameras that delivered no image for the latest scan, or were known
+    /// to have failed. Usually none.
+    fn failed_cameras(&self) -> &[&'static str] {
+        &[]
+    }
+
     /// Returns the health of that sensor.
     fn health(&self) -> Health {
         Health::Ok

@@ -222,6 +222,10 @@ impl Perception for FullPerception {
         self.classifier.as_ref().map_or(Vec::new(), |classifier| classifier.rear_images())
     }
 
+    fn failed_cameras(&self) -> &[&'static str] {
+        self.classifier.as_ref().map_or(&[], |classifier| classifier.failed_cameras())
+    }
+
     fn rear_fields(&self) -> Vec<FieldOfView> {
         self.rear.iter().flat_map(LidarChain::fields).collect()
     }

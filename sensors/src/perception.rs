@@ -177,6 +177,12 @@ pub trait Perception: Send {
         Vec::new()
     }
 
+    /// Returns the names of those of several rear cameras that delivered no image for the latest
+    /// scan, or were known to have failed: others classified what they see.
+    fn failed_cameras(&self) -> &[&'static str] {
+        &[]
+    }
+
     /// Returns the fields of view of the rear sensors. Returns none if their limits are not
     /// simulated.
     fn rear_fields(&self) -> Vec<FieldOfView> {

@@ -51,6 +51,8 @@ pub(crate) struct SeveralCameras {
     members: Vec<CameraMember>,
     /// For each detection of the latest scan, the camera that classifies it.
     owners: Vec<Option<usize>>,
+    /// The names of the cameras that did not work when the latest scan was classified.
+    failed: Vec<&'static str>,
     /// The detections that a camera's network gets.
     given: Vec<Detection>,
     /// Vehicles that only cameras see.
@@ -60,7 +62,7 @@ pub(crate) struct SeveralCameras {
 impl SeveralCameras {
     /// Creates the cameras of one run.
     pub(crate) fn new(members: Vec<CameraMember>) -> Self {
-        Self { members, owners: Vec::new(), given: Vec::new(), alone: Vec::new() }
+        Self { members, owners: Vec::new(), failed: Vec::new(), given: Vec::new(), alone: Vec::new() }
     }
 
     /// Returns the number of the camera that sees a detection best: a working one if there is one.
@@ -98,6 +100,8 @@ impl SeveralCameras {
 
 impl DetectionClassifier for SeveralCameras {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
+        let failed = self.members.iter().filter(|member| !member.works(scene));
+        self.failed = failed.map(|member| member.camera.camera().name).collect();
         self.owners = detections.iter().map(|detection| self.owner(scene, detection)).collect();
         for (number, member) in self.members.iter_mut().enumerate() {
             // A network that reads the whole image has to know what other detections hide.
@@ -124,6 +128,10 @@ impl DetectionClassifier for SeveralCameras {
 
     fn rear_images(&self) -> Vec<&RearImage> {
         self.members.iter().flat_map(|member| member.classifier.rear_images()).collect()
+    }
+
+    fn failed_cameras(&self) -> &[&'static str] {
+        &self.failed
     }
 
     fn health(&self) -> Health {

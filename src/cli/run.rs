@@ -81,7 +81,7 @@ pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome],
         (Format::Human, outcomes) => {
             let letters = VehicleLetters::of(scenario);
             for (outcome, arm) in outcomes.iter().zip(arms) {
-                let sentence = causal_sentence(scenario, arm.sensors, outcome);
+                let sentence = causal_sentence(scenario, (arm.sensors, arm.goal_s(scenario)), outcome);
                 print_text(OutcomeText { outcome, sentence: &sentence, letters: &letters });
             }
             textln!("{LETTERS}");

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use closecall_controllers::external::VariableTable;
-use closecall_controllers::{EgoController, EgoSettings};
+use closecall_controllers::{CheckedDriver, EgoController, EgoSettings, MisSettings};
+use closecall_scenarios::Scenario;
 use closecall_sensors::SensorMode;
 
 use crate::controller::isolated::Isolated;
@@ -58,4 +59,23 @@ pub struct Arm {
     pub controller: Arc<dyn ControllerFactory>,
     /// The depth of the sensor simulation, or `None` for the scenario's own.
     pub sensors: Option<SensorMode>,
+}
+
+impl Arm {
+    /// Returns the settings of the margin increase system in a scenario; `None` if the arm has no
+    /// such system.
+    pub fn mis(&self, scenario: &Scenario) -> Option<MisSettings> {
+        match &scenario.actors[scenario.ego].driver {
+            CheckedDriver::Ego(settings) if self.controller.has_mis(settings) => {
+                self.controller.settings(settings).mis().copied()
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the front time headway that the margin increase system is to gain (s); `None` if the
+    /// arm has no such system.
+    pub fn goal_s(&self, scenario: &Scenario) -> Option<f64> {
+        self.mis(scenario).map(|mis| mis.thw_gain_s)
+    }
 }

@@ -11,8 +11,8 @@ impl Film {
     /// why, which faults held. `None` for recorded traffic.
     pub(in crate::run) fn sentence(&self) -> Option<CausalSentence<'_>> {
         let outcome = self.outcome.as_ref()?;
-        let engaged_for = self.engaged_for();
-        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, engaged_for })
+        let (engaged_for, goal_s) = (self.engaged_for(), self.goal_s);
+        Some(CausalSentence { outcome, letters: &self.letters, faults: &self.faults, engaged_for, goal_s })
     }
 
     /// Returns the sentence about the run as text.

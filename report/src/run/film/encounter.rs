@@ -48,6 +48,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         avoidable: Vec::new(),
         letters: VehicleLetters::default(),
         faults: Vec::new(),
+        goal_s: None,
         highlight: Some(encounter.crossing),
         foreword: String::new(),
         settings: Vec::new(),

@@ -116,6 +116,8 @@ pub struct Frame {
     /// Images of rear cameras that a network has evaluated as a whole, in the frames in which they
     /// were taken; none below [`Level::Full`].
     pub(in crate::run) rear_images: Vec<RearImage>,
+    /// Names of those of several rear cameras that had failed when the scan was classified.
+    pub(in crate::run) failed_cameras: Vec<&'static str>,
 }
 
 impl Frame {
@@ -178,6 +180,8 @@ pub struct Film {
     pub(in crate::run) letters: VehicleLetters,
     /// The faults that were injected.
     pub(in crate::run) faults: Vec<StatedFault>,
+    /// The front time headway that the margin increase system is to gain (s); `None` without one.
+    pub(in crate::run) goal_s: Option<f64>,
     /// The critical moment, if it follows from something other than collisions and headways.
     pub(in crate::run) highlight: Option<Time>,
     /// Text that precedes the story, in Markdown.

@@ -94,6 +94,7 @@ impl FilmRecorder {
             avoidable: Vec::new(),
             letters: VehicleLetters::of(scenario),
             faults: sensors.stated_faults(),
+            goal_s: arm.goal_s(scenario),
             highlight: None,
             foreword: String::new(),
             settings: Vec::new(),
@@ -197,10 +198,7 @@ fn stack(scenario: &Scenario) -> Option<&EgoSettings> {
 /// Returns the comfort limit of the MIS, if the arm has one, and the friction limit.
 fn limits(scenario: &Scenario, arm: &Arm) -> Vec<Limit> {
     let mut limits = Vec::new();
-    if let Some(settings) = stack(scenario)
-        && arm.controller.has_mis(settings)
-        && let Some(mis) = arm.controller.settings(settings).mis()
-    {
+    if let Some(mis) = arm.mis(scenario) {
         limits.push(Limit { name: "MIS comfort limit".to_owned(), value: -mis.max_deceleration_mps2 });
     }
     let friction_mps2 = -GRAVITY_MPS2 * scenario.environment.friction;
@@ -239,6 +237,7 @@ impl Observer for FilmRecorder {
                 }
                 false => Vec::new(),
             },
+            failed_cameras: view.perception.failed_cameras().to_vec(),
         });
     }
 

@@ -104,6 +104,7 @@ pub fn film_lane_change(
         avoidable: Vec::new(),
         letters: VehicleLetters::default(),
         faults: Vec::new(),
+        goal_s: None,
         highlight: critical_time(change),
         foreword: String::new(),
         settings: Vec::new(),
@@ -273,6 +274,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         radar_health: None,
         radar_returns: None,
         rear_images: Vec::new(),
+        failed_cameras: Vec::new(),
         scan: None,
     }
 }

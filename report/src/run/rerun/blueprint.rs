@@ -65,8 +65,6 @@ pub(super) struct FilmContents {
     pub(super) plots: Vec<Plot>,
     /// Times of the first and the last frame.
     pub(super) span: [Time; 2],
-    /// The weather, except on a clear day.
-    pub(super) weather: Option<String>,
 }
 
 /// Writes the layout for these films. `verdict_text` is the text of the verdict.
@@ -185,10 +183,7 @@ fn camera(title: String, (film, pictures): (&FilmContents, &Pictures)) -> Node {
 /// Returns the 3D view of a film, which moves along the road with the ego.
 fn scene(film: &FilmContents) -> Node {
     let root = &film.root;
-    let mut title = format!("Scene: {}", film.name);
-    if let Some(weather) = &film.weather {
-        title.push_str(&format!(" · {weather}"));
-    }
+    let title = format!("Scene: {}", film.name);
     let eye = EyeControls3D::new()
         .with_kind(Eye3DKind::Orbital)
         .with_position(EYE_M)

@@ -420,7 +420,7 @@ impl Plots<'_> {
         let style = CurveStyle { name: "foreseen", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         self.curve("plots/margin/foreseen", &style, |frame| gained(frame, plan(frame)?.thw_at_critical_s.ok()))?;
         let goal_s = planned.map(|plan| plan.goal_thw_s - thw_s);
-        let style = CurveStyle { name: "goal +2 s", colour: palette::SAFE, width: THIN_LINE_WIDTH };
+        let style = CurveStyle { name: "goal", colour: palette::SAFE, width: THIN_LINE_WIDTH };
         self.curve("plots/margin/goal", &style, |frame| goal_s.filter(|_| frame.time >= since))?;
         Ok(true)
     }

@@ -136,7 +136,6 @@ fn write_film(
         name: film.arm_label().to_owned(),
         root,
         bird_range: canvas.range_m(),
-        weather: film.weather(),
         sky: palette::through_fog(palette::sky(light), fog::clear_share(film), light),
         span: [film.frames.first().map_or(Time::ZERO, |frame| frame.time), film.end()],
         ..FilmContents::default()

@@ -16,10 +16,13 @@ pub(super) fn windows(film: &Film, number: usize, frame: &Frame) -> (Boxes2D, Po
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let cameras: Vec<RearCamera> = film.cameras.iter().map(|(camera, _)| RearCamera::new(*camera)).collect();
     let used = || cameras.iter().enumerate().filter(|(_, camera)| camera.camera().pipeline != Pipeline::Off);
+    let working = || used().filter(|(_, camera)| !frame.failed_cameras.contains(&camera.camera().name));
+    let owner =
+        |detection: &Detection| best_camera(working(), &ego, detection).or_else(|| best_camera(used(), &ego, detection));
     let camera = &cameras[number];
     let in_image: Vec<(&Detection, PixelRect)> = boxes
         .iter()
-        .filter(|detection| best_camera(used(), &ego, detection) == Some(number))
+        .filter(|detection| owner(detection) == Some(number))
         .filter_map(|detection| Some((detection, camera.detection_window(&ego, detection)?)))
         .collect();
     let part = Shown::of(camera.camera().resolution);
