@@ -94,6 +94,7 @@ const axis = (one, colours) => ({
 const layout = (colours, more) => ({
   dragmode: 'select', showlegend: false, margin: { l: 48, r: 12, t: 8, b: 36 }, paper_bgcolor: colours.sheet, plot_bgcolor: colours.sheet,
   font: { color: colours.ink, size: 12, family: 'system-ui, sans-serif' }, hovermode: 'closest', selections: [],
+  hoverlabel: { bgcolor: colours.sheet, bordercolor: colours.soft, font: { color: colours.ink } },
   newselection: { line: { color: colours.link, width: 2 } }, activeselection: { fillcolor: colours.link, opacity: 0.2 }, ...more,
 });
 const config = { displayModeBar: false, logging: 0, responsive: true, doubleClick: false, scrollZoom: false };

@@ -36,7 +36,7 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
                 (influence::section(findings, scenario)?)
                 (margins(scenario)?)
                 (coverage::tables(findings.judged, &scenario.name))
-                (sampled_values(scenario)?)
+                (sampled_values(findings, scenario)?)
             }
         }
     })
@@ -153,7 +153,9 @@ fn absent(arms: &[String], bins: &[MarginBins]) -> String {
         .join("; ")
 }
 
-fn sampled_values(scenario: &ScenarioOverview) -> io::Result<Markup> {
+/// Returns how the samples cover the parameters. A report of many scenarios has no chart of each
+/// parameter: they would be nearly half of its bytes, and the explorer draws each with a choice of samples.
+fn sampled_values(findings: &Findings<'_>, scenario: &ScenarioOverview) -> io::Result<Markup> {
     if scenario.axes.is_empty() {
         return Ok(Markup::default());
     }
@@ -171,10 +173,14 @@ fn sampled_values(scenario: &ScenarioOverview) -> io::Result<Markup> {
                 "distribution hardly reaches stay empty."
             }
         }
-        (fate_legend(scenario))
-        div.charts {
-            @for (axis, counts) in scenario.axes.iter().zip(&scenario.coverage) {
-                figure { (charts::coverage(axis, counts)?) }
+        @if findings.has_many() {
+            p.note { "The explorer (" code { "closecall view" } ") shows the distribution of each parameter." }
+        } @else {
+            (fate_legend(scenario))
+            div.charts {
+                @for (axis, counts) in scenario.axes.iter().zip(&scenario.coverage) {
+                    figure { (charts::coverage(axis, counts)?) }
+                }
             }
         }
     })

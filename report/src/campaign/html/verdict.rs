@@ -65,7 +65,7 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
                 }
                 @if !shown.is_empty() { ul { @for reason in shown { li { (reason) } } } }
                 @if !more.is_empty() {
-                    details { summary { (more.len()) " more remarks" } ul { @for reason in more { li { (reason) } } } }
+                    details { summary { (counted(more.len(), "more remark")) } ul { @for reason in more { li { (reason) } } } }
                 }
                 p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
             }
