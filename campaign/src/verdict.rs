@@ -24,6 +24,7 @@ use super::attribution;
 use super::coverage::CoverageResult;
 use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
+use super::ledger::ArmCounts;
 use super::probability::{Answer, Finding};
 use super::summary::Summary;
 use super::validity::{CheckCounts, Invariance, RunOfScenario};
@@ -446,25 +447,42 @@ fn judge_extrapolation(judge: &Judge, findings: &mut Findings) {
 /// exceeds [`MAX_UNAVAILABLE_SHARE`], the samples do not decide about the system, even if it
 /// engages before its sensors fail.
 fn judge_availability(summary: &Summary, findings: &mut Findings) {
-    for (name, counts) in &summary.scenarios {
-        let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
-        let sentence = format!(
-            "{name}: the system under test was not available, because sensors had failed, in {} of {}",
-            tested.unavailable,
-            samples(tested.outcomes)
-        );
-        if tested.unavailable as f64 > MAX_UNAVAILABLE_SHARE * tested.outcomes as f64 {
-            let reason = format!(
-                "{sentence}, more than {}, and they do not decide what it does (it engaged in {})",
-                percent(MAX_UNAVAILABLE_SHARE),
+    let arms = summary.scenarios.iter().filter_map(|(name, counts)| Some((name.as_str(), counts.arms.last()?)));
+    let (often, seldom): (Vec<_>, Vec<_>) = arms
+        .filter(|(_, tested)| tested.unavailable > 0)
+        .partition(|(_, tested)| tested.unavailable as f64 > MAX_UNAVAILABLE_SHARE * tested.outcomes as f64);
+    let count = |tested: &ArmCounts| format!("{} of {}", tested.unavailable, samples(tested.outcomes));
+    for (name, tested) in seldom {
+        findings.background(format!("{name}: {NOT_AVAILABLE} in {}", count(tested)));
+    }
+    let most = percent(MAX_UNAVAILABLE_SHARE);
+    match often[..] {
+        [] => {}
+        [(name, tested)] => findings.add(
+            Decision::NotJudged,
+            format!(
+                "{name}: {NOT_AVAILABLE} in {}, more than {most}, and they do not decide what it does (it engaged in {})",
+                count(tested),
                 samples(tested.engagements)
+            ),
+        ),
+        _ => {
+            let told = |(name, tested): &(&str, &ArmCounts)| {
+                format!("{name} (in {}; it engaged in {})", count(tested), tested.engagements)
+            };
+            let list: Vec<String> = often.iter().map(told).collect();
+            let reason = format!(
+                "in {} scenarios {NOT_AVAILABLE} in more than {most} of the samples, and they do not decide what it does: {}",
+                often.len(),
+                list.join(", ")
             );
             findings.add(Decision::NotJudged, reason);
-        } else {
-            findings.background(sentence);
         }
     }
 }
+
+/// The remark on a system whose sensors had failed.
+const NOT_AVAILABLE: &str = "the system under test was not available, because sensors had failed,";
 
 /// A system that never acted was not tested by a scenario that asks for prevented collisions.
 fn judge_action(judge: &Judge, findings: &mut Findings) {

@@ -6,11 +6,17 @@ use crate::ledger::Tally;
 /// Returns what 10 samples decide. In some of them the system under test is not available, and
 /// engages.
 fn availability(unavailable: u64, engaged: u64) -> Findings {
-    let mut summary = Summary::new(vec!["acc+mis".to_owned()], ["close".to_owned()]);
-    for sample in 0..10 {
-        let (unavailable, engaged) = (sample < unavailable, sample < engaged);
-        let tally = Tally { collided: Some(false), unavailable, engaged, ..Tally::default() };
-        summary.scenarios[0].1.arms[0].push(tally);
+    availability_in(&["close"], unavailable, engaged)
+}
+
+fn availability_in(scenarios: &[&str], unavailable: u64, engaged: u64) -> Findings {
+    let mut summary = Summary::new(vec!["acc+mis".to_owned()], scenarios.iter().map(|&name| name.to_owned()));
+    for (_, counts) in &mut summary.scenarios {
+        for sample in 0..10 {
+            let (unavailable, engaged) = (sample < unavailable, sample < engaged);
+            let tally = Tally { collided: Some(false), unavailable, engaged, ..Tally::default() };
+            counts.arms[0].push(tally);
+        }
     }
     let mut findings = Findings::default();
     judge_availability(&summary, &mut findings);
@@ -29,6 +35,20 @@ fn a_system_that_is_not_available_in_most_samples_is_not_tested_whether_it_engag
     let reason = &half.reasons[0].text;
     assert!(half.decisions().is_empty() && reason.contains("in 5 of 10 samples"), "{reason}");
     assert!(availability(0, 0).reasons.is_empty());
+}
+
+#[test]
+fn several_scenarios_without_an_available_system_are_one_remark() {
+    let findings = availability_in(&["dead", "frozen"], 6, 2);
+    let texts: Vec<&str> = findings.reasons.iter().map(|reason| reason.text.as_str()).collect();
+    assert_eq!(
+        texts,
+        [
+            "in 2 scenarios the system under test was not available, because sensors had failed, in more than 50 % of the samples, \
+             and they do not decide what it does: dead (in 6 of 10 samples; it engaged in 2), frozen (in 6 of 10 samples; it engaged in 2)"
+        ]
+    );
+    assert_eq!(findings.decisions(), [Decision::NotJudged]);
 }
 
 #[test]

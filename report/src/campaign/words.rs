@@ -10,7 +10,7 @@
 //! Gates that are met and remarks on single scenarios are folded on the page and in the summary. On
 //! the terminal, many are above it.
 
-use closecall_campaign::gate::{Answer, Certainty, Evaluation, GateResult, GateSource, Standing};
+use closecall_campaign::gate::{Answer, Certainty, Evaluation, GateResult, GateSource, RequirementResult, Standing};
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::criteria::{Aggregate, Comparison, Operator, Quantity, Side};
 use closecall_traffic::statistics::format::{DIGITS, percent, significant, without_trailing_zeros};
@@ -56,9 +56,19 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
                 format!("all {scenarios} scenarios meet")
             };
             let unchecked = standings.iter().filter(|standing| **standing == Standing::NotChecked).count();
-            Some(match unchecked {
-                0 => format!("{word}: {all} what is required, {met} of {} gates", standings.len()),
-                _ => format!("{word}: {met} of {} gates are met, {unchecked} not checked", standings.len()),
+            let has_criteria = |requirement: &&RequirementResult| {
+                judged.gates.iter().any(|gate| gate.scenario == requirement.scenario && gate.is_of(&requirement.mark))
+            };
+            let without_criteria = judged.requirements.len() - judged.requirements.iter().filter(has_criteria).count();
+            let rest = [
+                (unchecked > 0).then(|| format!("{unchecked} not checked")),
+                (without_criteria > 0)
+                    .then(|| format!("{} without criteria", counted(without_criteria, "requirement"))),
+            ];
+            let rest: Vec<String> = rest.into_iter().flatten().collect();
+            Some(match rest.is_empty() {
+                true => format!("{word}: {all} what is required, {met} of {} gates", standings.len()),
+                false => format!("{word}: {met} of {} gates are met, {}", standings.len(), rest.join(", ")),
             })
         }
         Decision::NotJudged | Decision::Overridden | Decision::SampleError | Decision::Invalid => first_reason(),
@@ -140,7 +150,7 @@ pub(crate) fn gate_words(gate: &GateResult) -> String {
     let Evaluation { value, interval_95, certainty, samples, hits, .. } = gate.evaluation;
     let (subject, is_share) = subject(expression.aggregate, &expression.quantity);
     let condition =
-        expression.condition.map_or_else(String::new, |condition| format!(", where {}", flag_words(&condition)));
+        expression.condition.map_or_else(String::new, |condition| format!(", where {}", quantity_words(&condition)));
     let unit = match (&expression.quantity, is_share) {
         (Quantity::Tested(measure) | Quantity::Baseline(measure), false) if !expression.aggregate.is_of_flag() => {
             unit_of(measure.name)
@@ -218,22 +228,34 @@ fn beyond(certainty: Option<Certainty>, side: &str) -> String {
 
 /// Returns the judged quantity in words, and whether it is a share.
 fn subject(aggregate: Aggregate, quantity: &Quantity) -> (String, bool) {
-    let words = flag_words(quantity);
+    let words = quantity_words(quantity);
     match aggregate {
         Aggregate::Count => (format!("number of samples in which {words}"), false),
         Aggregate::Share | Aggregate::Lower | Aggregate::Upper => {
             (format!("share of the samples in which {words}"), true)
         }
-        Aggregate::Min => (format!("smallest value of: {words}"), false),
-        Aggregate::Max => (format!("largest value of: {words}"), false),
-        Aggregate::Mean => (format!("mean of: {words}"), false),
-        Aggregate::Sum => (format!("sum of: {words}"), false),
-        Aggregate::Percentile(percent) => (format!("{percent} % percentile of: {words}"), false),
+        Aggregate::Min => (format!("smallest value of the {words}"), false),
+        Aggregate::Max => (format!("largest value of the {words}"), false),
+        Aggregate::Mean => (format!("mean of the {words}"), false),
+        Aggregate::Sum => (format!("sum of the {words}"), false),
+        Aggregate::Percentile(percent) => (format!("{} percentile of the {words}", ordinal(percent)), false),
         Aggregate::Coverage => (format!("share of the bins of {words} that samples hit"), true),
     }
 }
 
-fn flag_words(quantity: &Quantity) -> String {
+/// Returns a percentage as an ordinal number: *99th*, *2.5th*.
+fn ordinal(percent: f64) -> String {
+    let ending = match (percent % 10.0, (percent % 100.0 / 10.0).floor()) {
+        (_, 1.0) => "th",
+        (1.0, _) => "st",
+        (2.0, _) => "nd",
+        (3.0, _) => "rd",
+        _ => "th",
+    };
+    format!("{percent}{ending}")
+}
+
+fn quantity_words(quantity: &Quantity) -> String {
     match quantity {
         Quantity::Tested(measure) => measure.meaning.to_owned(),
         Quantity::Baseline(measure) => format!("{} in the baseline", measure.meaning),
@@ -502,6 +524,12 @@ mod tests {
     }
 
     #[test]
+    fn percentiles_are_ordinal_numbers() {
+        let words = [1.0, 2.0, 3.0, 11.0, 22.0, 50.0, 99.0, 99.5].map(ordinal);
+        assert_eq!(words, ["1st", "2nd", "3rd", "11th", "22nd", "50th", "99th", "99.5th"]);
+    }
+
+    #[test]
     fn what_is_open_or_met_is_said_so() {
         let open = Answer::Open(OpenReason::TooFewSamples);
         let judgement = judged(Decision::Inconclusive, vec![gate("a", "p1(min_ttc_rear_s) >= 1", None, 0.9, open)]);
@@ -509,7 +537,7 @@ mod tests {
         let words = gate_words(&judgement.gates[0]);
         assert_eq!(
             words,
-            "1 % percentile of: smallest time to collision of the rear vehicle: 0.9 s (point estimate from 60 samples, without a \
+            "1st percentile of the smallest time to collision of the rear vehicle: 0.9 s (point estimate from 60 samples, without a \
              confidence bound; the point estimate decides) (too few samples to decide, and no number would if they are like these); required: at least 1 s"
         );
         let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);
