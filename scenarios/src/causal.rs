@@ -183,7 +183,8 @@ impl CausalSentence<'_> {
     /// Returns how long before or after the braking the MIS engaged, and how much it could do.
     fn engaged(&self, mis: &MisSummary, engaged_at_s: f64) -> String {
         let when = self.since_braking(engaged_at_s);
-        let headways_s = mis.thw_front_at_engagement_s.and_then(|before_s| Ok([before_s, mis.thw_front_at_critical_s?]));
+        let headways_s =
+            mis.thw_front_at_engagement_s.and_then(|before_s| Ok([before_s, mis.thw_front_at_critical_s?]));
         let gained = headways_s.map_or_else(
             |_| String::new(),
             |[before_s, after_s]| format!(", front headway {before_s:.2} to {after_s:.2} s"),
@@ -397,8 +398,9 @@ mod tests {
         let mut run = outcome(Vec::new(), Reason::Engaged);
         run.mis.as_mut().unwrap().engaged_at_s = Ok(2.0);
         let (letters, goal_s) = (letters(), None);
-        let told =
-            |engaged_for| CausalSentence { outcome: &run, letters: &letters, faults: &[], engaged_for, goal_s }.reason();
+        let told = |engaged_for| {
+            CausalSentence { outcome: &run, letters: &letters, faults: &[], engaged_for, goal_s }.reason()
+        };
         assert_eq!(
             told(Some("a vehicle that does not exist")),
             "the MIS engaged for a vehicle that does not exist at 2.0 s, 7.0 s before F braked; faults: none"

@@ -68,6 +68,8 @@ struct Drive {
     /// The class scores of the car's box in each step.
     classes: Vec<ClassScores>,
     health: Health,
+    /// The cameras that do not classify at the end.
+    failed: Vec<&'static str>,
     faults: Vec<String>,
 }
 
@@ -91,7 +93,7 @@ fn drive(sensors: &str, fault: &str, (gap_m, d_m): (f64, f64)) -> Drive {
         }
     }
     let faults = sensors.stated_faults().iter().map(ToString::to_string).collect();
-    Drive { classes, health: perception.health().rear, faults }
+    Drive { classes, health: perception.health().rear, failed: perception.failed_cameras().to_vec(), faults }
 }
 
 fn classes(sensors: &str, fault: &str, place: (f64, f64)) -> Vec<ClassScores> {
@@ -139,7 +141,10 @@ fn a_dead_camera_leaves_its_vehicles_to_the_other() {
     assert!(by_twin != shape && is_car(&by_twin));
     let second = format!("{dead}\nsensor = \"twin\"");
     assert_eq!(classes(TWINS, &second, place), classes("", "", place));
-    assert_eq!(drive(TWINS, &second, place).faults, ["rear camera `twin` dead"]);
+    let without_twin = drive(TWINS, &second, place);
+    assert_eq!(without_twin.faults, ["rear camera `twin` dead"]);
+    assert_eq!(without_twin.failed, ["twin"], "a recording shows no window in its image");
+    assert!(drive(TWINS, "", place).failed.is_empty());
     // The health of a camera whose places another sees, and of one whose places none sees.
     let health = |sensors: &str, fault: &str| drive(sensors, fault, place).health;
     assert_eq!(

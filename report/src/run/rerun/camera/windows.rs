@@ -17,8 +17,9 @@ pub(super) fn windows(film: &Film, number: usize, frame: &Frame) -> (Boxes2D, Po
     let cameras: Vec<RearCamera> = film.cameras.iter().map(|(camera, _)| RearCamera::new(*camera)).collect();
     let used = || cameras.iter().enumerate().filter(|(_, camera)| camera.camera().pipeline != Pipeline::Off);
     let working = || used().filter(|(_, camera)| !frame.failed_cameras.contains(&camera.camera().name));
-    let owner =
-        |detection: &Detection| best_camera(working(), &ego, detection).or_else(|| best_camera(used(), &ego, detection));
+    let owner = |detection: &Detection| {
+        best_camera(working(), &ego, detection).or_else(|| best_camera(used(), &ego, detection))
+    };
     let camera = &cameras[number];
     let in_image: Vec<(&Detection, PixelRect)> = boxes
         .iter()
