@@ -70,12 +70,16 @@ impl Scenario {
     }
 }
 
+/// Longest duration of a run that a scenario file may state (s): an assumption, against a misprint;
+/// 600 to 100,000 are plausible.
+pub(crate) const LONGEST_RUN_S: f64 = 3_600.0;
+
 impl Check for ScenarioConfig {
     type Checked = Scenario;
 
     fn check(&self, parameters: &Parameters) -> Result<Scenario, ConfigError> {
         self.check_names()?;
-        let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
+        let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, LONGEST_RUN_S))?;
         let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
         let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
         let duration = Time::from_s(duration_s);

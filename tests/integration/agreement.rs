@@ -86,7 +86,7 @@ fn gates(random: &mut StdRng) -> Vec<String> {
     add(random, 0.4, "--max-collisions", &["0", "3", "24"]);
     add(random, 0.2, "--max-other-collisions", &["0", "5"]);
     add(random, 0.2, "--max-induced", &["0", "2", "20"]);
-    add(random, 0.2, "--min-prevented", &["0", "0.3", "1"]);
+    add(random, 0.2, "--min-prevented", &["0.01", "0.3", "0.99"]);
     add(random, 0.2, "--max-harm", &["0.001", "0.5"]);
     add(random, 0.2, "--max-probability", &["0.05", "0.6", "0.99"]);
     add(random, 0.2, "--max-jerk", &["1", "9.9", "10"]);

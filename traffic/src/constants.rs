@@ -23,3 +23,7 @@ pub const ENGAGEMENT_GAP_M: f64 = 100.0;
 /// Smallest closing speed of a rear vehicle at which the margin increase system engages, and from
 /// which it counts as approaching (m/s): 10 km/h; from the paper.
 pub const ENGAGEMENT_CLOSING_MPS: f64 = 10.0 / 3.6;
+
+/// Largest jerk that the actuators of any vehicle cause, as a magnitude (m/s³): an assumption for a
+/// car; 20 to 60 are plausible.
+pub const LARGEST_JERK_MPS3: f64 = 40.0;

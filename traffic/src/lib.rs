@@ -94,7 +94,9 @@ pub use acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 pub use actor::{ActorId, InvalidActorId};
 pub use body_shape::BodyShape;
 pub use check::{Check, ConfigError, KeyPath, Problem, Range, Segment};
-pub use constants::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, GRAVITY_MPS2, PHYSICS_STEP};
+pub use constants::{
+    CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, GRAVITY_MPS2, LARGEST_JERK_MPS3, PHYSICS_STEP,
+};
 pub use environment::{Environment, EnvironmentConfig, Light};
 pub use lateral_path::LateralPath;
 pub use number::{Choice, Num, ParameterName};

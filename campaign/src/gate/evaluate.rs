@@ -42,7 +42,7 @@ pub enum OpenReason {
     WeightedSamples,
     /// The samples are points of a design, and a bound of a probability needs independent ones.
     DependentSamples,
-    /// The bound is the end of the range of the value, or lies beyond it.
+    /// The bound allows a count as large as the number of samples.
     HoldsAlways,
 }
 
@@ -178,7 +178,6 @@ impl Evaluation {
         let holds = |share: f64| expression.operator.holds(share, expression.bound);
         let answer = match covered {
             None => Answer::Open(OpenReason::NotInCoverage),
-            Some((_, samples)) if expression.holds_always(samples) => Answer::Open(OpenReason::HoldsAlways),
             Some((share, _)) if holds(share) => Answer::Met,
             Some(_) => Answer::Missed,
         };
@@ -293,7 +292,7 @@ impl Accumulator {
         // Few samples do not show a percentile. Their count or extreme is a fact.
         let answer = if operator.holds(observed, bound) {
             match is_enough {
-                true if self.expression.holds_always(samples) => Answer::Open(OpenReason::HoldsAlways),
+                true if self.expression.holds_always(self.added.max(samples)) => Answer::Open(OpenReason::HoldsAlways),
                 true => Answer::Met,
                 false => Answer::Open(OpenReason::TooFewSamples),
             }
@@ -479,22 +478,15 @@ mod tests {
                 .evaluate(&evidence)
                 .answer
         };
-        for gate in [
-            "count(ego_collided) >= 0",
-            "share(ego_collided) <= 1",
-            "upper(ego_collided) <= 1",
-            "lower(prevented | baseline.ego_collided) >= 0",
-            "max(max_jerk_mps3) <= 1e300",
-            "sum(harm) >= 0",
-        ] {
+        for gate in ["count(ego_collided) <= 60", "count(ego_collided) <= 1000"] {
             assert_eq!(answer(gate), Answer::Open(OpenReason::HoldsAlways), "{gate}");
         }
-        for gate in ["count(ego_collided) <= 60", "share(ego_collided) >= 0.01", "max(max_jerk_mps3) <= 1000"] {
+        for gate in ["count(ego_collided) <= 59", "share(ego_collided) >= 0.01", "max(max_jerk_mps3) <= 39"] {
             assert_eq!(answer(gate), Answer::Met, "{gate}");
         }
-        let covered = |gate: &str| Evaluation::of_coverage(&gate.parse().unwrap(), Some((0.4, 60))).answer;
-        assert_eq!(covered("coverage(gap) >= 0"), Answer::Open(OpenReason::HoldsAlways));
-        assert_eq!(covered("coverage(gap) >= 0.4"), Answer::Met);
+        // Of 400 samples, any 60 could have the condition, and more of them.
+        let some = Accumulator { samples: 60, added: 400, ..Accumulator::new("count(induced) <= 80".parse().unwrap()) };
+        assert_eq!(some.evaluate(&evidence).answer, Answer::Met);
     }
 
     #[test]

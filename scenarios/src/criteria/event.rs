@@ -13,7 +13,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::expression::{Quantity, parse_quantity};
-use super::measure::{EGO_COLLIDED, LARGEST, MEASURES, Measure, MeasureKind};
+use super::measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind};
 
 /// Another name of the collision of the ego.
 const COLLISION: &str = "collision";
@@ -62,16 +62,19 @@ impl Event {
         }
     }
 
-    /// Returns true if the event happens in every run or in none, whatever happens there: no value
-    /// of the number lies on both sides of the bound.
-    fn is_constant(&self) -> bool {
-        let Some((comparison, bound)) = self.bound else { return false };
-        let is_beyond = |least: f64| match comparison {
-            Comparison::Below | Comparison::AtLeast => bound <= least,
-            Comparison::AtMost | Comparison::Above => bound < least,
+    /// Returns why the event happens in every run or in none, whatever happens there: no value of
+    /// the number lies on the other side of the bound. Returns `None` for other events.
+    fn foregone(&self) -> Option<String> {
+        let ((comparison, bound), (measure, _)) = (self.bound?, self.quantity.measure()?);
+        let (low, high) = (measure.range.low(), measure.range.high());
+        let (always, never) = match comparison {
+            Comparison::Below => (bound > high, bound <= low),
+            Comparison::AtMost => (bound >= high, bound < low),
+            Comparison::Above => (bound < low, bound >= high),
+            Comparison::AtLeast => (bound <= low, bound > high),
         };
-        let least = self.quantity.measure().and_then(|(measure, _)| measure.least());
-        bound.abs() > LARGEST || least.is_some_and(is_beyond)
+        let when = if always { "every sample" } else { "no sample" };
+        (always || never).then(|| format!("it happens in {when}: `{}` is {}", measure.name, measure.range))
     }
 
     /// Returns how far a value is beyond the bound, negative if the event does not happen; `None`
@@ -167,10 +170,7 @@ fn parse_event(text: &str) -> Result<Event, String> {
         Ok(bound_value) if bound_value.is_finite() => Event { quantity, bound: Some((comparison, bound_value)) },
         _ => return Err(format!("the bound `{}` is not a finite number", bound.trim())),
     };
-    match event.is_constant() {
-        true => Err(format!("no value of `{quantity}` lies on the other side of {}", bound.trim())),
-        false => Ok(event),
-    }
+    event.foregone().map_or(Ok(event), Err)
 }
 
 /// The number that leads to an event: of the smallest of something, a smaller one is nearer, else a
@@ -219,7 +219,7 @@ mod tests {
             "min_ttc_rear_s < 0.3",
             "min_ttc_rear_s <= 0.001",
             "max_jerk_mps3 > 20",
-            "baseline.min_gap_rear_m >= -1",
+            "baseline.min_gap_rear_m >= 1",
             "harm > 0",
             "impact_speed_mps <= 0",
             "baseline.ego_collided - ego_collided",
@@ -241,12 +241,15 @@ mod tests {
             ("min_ttc_rear_s < nan", "not a finite number"),
             ("min_ttc_rear_s < inf", "not a finite number"),
             ("min_ttc_rear_s < ", "not a finite number"),
-            ("min_ttc_rear_s < -1e9", "no value of `min_ttc_rear_s` lies on the other side of -1e9"),
-            ("max_jerk_mps3 < 1e9", "on the other side"),
-            ("harm < 0", "on the other side"),
-            ("harm >= 0", "on the other side"),
-            ("baseline.delta_v_mps > -1", "on the other side"),
-            ("duration_s <= -0.1", "on the other side"),
+            ("min_ttc_rear_s < -5", "it happens in no sample: `min_ttc_rear_s` is a number from 0 to 1000000"),
+            ("min_ttc_rear_s < 0", "in no sample"),
+            ("min_gap_front_m > -1", "in every sample"),
+            ("max_jerk_mps3 < 1e9", "in every sample"),
+            ("max_deceleration_mps2 >= 12", "in no sample: `max_deceleration_mps2` is a number from 0 to 11.772"),
+            ("harm < 0", "in no sample"),
+            ("harm >= 0", "in every sample"),
+            ("baseline.delta_v_mps > -1", "in every sample"),
+            ("duration_s <= -0.1", "in no sample"),
             ("induced - induced", "itself is 0"),
             ("count(induced) <= 0", "not a measure"),
         ] {

@@ -18,13 +18,20 @@
 //! `coverage(closing-by-class) >= 0.95` asks that samples hit 95 % of the bins of that item or
 //! cross. `share(imposed_braking_mps2 > 3) <= 0.05` asks that the vehicle behind brakes harder than
 //! 3 m/s² in at most 5 % of the samples.
+//!
+//! A gate that every sample meets, or that no sample can meet, says nothing, and is refused: its
+//! bound lies at the end of the range of the value or beyond ([`Measure::range`]), or its condition
+//! decides its flag.
 
 use std::fmt;
 use std::str::FromStr;
 
+use closecall_traffic::Range;
+
 use crate::coverage::CoverageName;
 
-use super::measure::{LARGEST, MEASURES, Measure, MeasureKind, PairFlag};
+use super::implied;
+use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
 
 /// A value that is computed from all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,14 +98,16 @@ impl Comparison {
         if value.is_nan() { value } else { f64::from(u8::from(holds)) }
     }
 
-    /// Returns true if the flag is the same in every sample: no value of the number lies on both
-    /// sides of the threshold.
-    fn is_constant(&self) -> bool {
-        let is_beyond = |least: f64| match self.side {
-            Side::Above => self.threshold < least,
-            Side::Below => self.threshold <= least,
-        };
-        self.threshold.abs() > LARGEST || self.measure.least().is_some_and(is_beyond)
+    /// Returns the value of the flag if it is the same for all values of the number in `range`.
+    fn foregone(&self, range: Range) -> Option<bool> {
+        let Self { threshold, .. } = *self;
+        match self.side {
+            Side::Above if threshold < range.low() => Some(true),
+            Side::Above if threshold >= range.high() => Some(false),
+            Side::Below if threshold > range.high() => Some(true),
+            Side::Below if threshold <= range.low() => Some(false),
+            _ => None,
+        }
     }
 }
 
@@ -237,45 +246,92 @@ impl Expression {
         self.operator == other.operator && self.subject() == other.subject()
     }
 
-    /// Returns true if `samples` samples that have the value cannot miss the gate, whatever happens
-    /// in them: the bound is the end of the range of the value, or lies beyond it. Such a gate says
-    /// nothing.
+    /// Returns true if `samples` samples cannot miss the gate, whatever happens in them: it allows a
+    /// count as large as their number. Bounds that no number of samples can miss are refused when
+    /// the gate is read.
     pub fn holds_always(&self, samples: u64) -> bool {
-        let Self { aggregate, quantity, operator, bound, .. } = *self;
-        if matches!(quantity, Quantity::Compared(comparison) if comparison.is_constant()) {
-            return true;
-        }
-        if aggregate == Aggregate::Share && operator == Operator::AtLeast && self.condition == Some(quantity) {
-            return true;
-        }
-        let least = || quantity.measure().and_then(|(measure, _)| measure.least());
-        match (aggregate, operator) {
-            // The allowed number may be fixed while the number of samples varies.
-            (Aggregate::Count, Operator::AtMost) => false,
-            (Aggregate::Share | Aggregate::Lower | Aggregate::Upper | Aggregate::Coverage, Operator::AtMost) => {
-                bound >= 1.0
-            }
-            (
-                Aggregate::Count | Aggregate::Share | Aggregate::Lower | Aggregate::Upper | Aggregate::Coverage,
-                Operator::AtLeast,
-            ) => bound <= 0.0,
-            (Aggregate::Sum, Operator::AtMost) => bound > LARGEST * samples as f64,
-            (Aggregate::Sum, Operator::AtLeast) => {
-                bound < -LARGEST * samples as f64 || least().is_some_and(|least| bound <= least * samples as f64)
-            }
-            (Aggregate::Min | Aggregate::Max | Aggregate::Mean | Aggregate::Percentile(_), Operator::AtMost) => {
-                bound > LARGEST
-            }
-            (Aggregate::Min | Aggregate::Max | Aggregate::Mean | Aggregate::Percentile(_), Operator::AtLeast) => {
-                bound < -LARGEST || least().is_some_and(|least| bound <= least)
+        self.aggregate == Aggregate::Count && self.operator == Operator::AtMost && self.bound >= samples as f64
+    }
+
+    /// Returns the range of the value that is bounded; `None` for a number without range.
+    fn range(&self) -> Option<Range> {
+        let of_number = || {
+            let (measure, in_baseline) = self.quantity.measure()?;
+            Some(range_where(measure, in_baseline, self.condition))
+        };
+        match self.aggregate {
+            Aggregate::Count => Some(Range::closed(0.0, f64::INFINITY)),
+            Aggregate::Share | Aggregate::Lower | Aggregate::Upper | Aggregate::Coverage => Some(Range::UNIT),
+            Aggregate::Min | Aggregate::Max | Aggregate::Mean | Aggregate::Percentile(_) => of_number(),
+            Aggregate::Sum => {
+                let range = of_number()?;
+                let low = if range.low() < 0.0 { f64::NEG_INFINITY } else { range.low() };
+                Some(Range::closed(low, f64::INFINITY))
             }
         }
+    }
+
+    /// Returns why the gate says nothing, whatever happens in the samples; `None` if it says
+    /// something.
+    fn foregone(&self) -> Option<String> {
+        let Self { aggregate, quantity, condition, operator, bound } = *self;
+        for (flag, condition) in [Some((quantity, condition)), condition.map(|flag| (flag, None))].into_iter().flatten()
+        {
+            let Quantity::Compared(comparison) = flag else { continue };
+            let range = range_where(comparison.measure, comparison.in_baseline, condition);
+            if let Some(holds) = comparison.foregone(range) {
+                let when = if holds { "every sample" } else { "no sample" };
+                return Some(format!("`{flag}` holds in {when}: `{}` is {range}", comparison.measure.name));
+            }
+        }
+        if let Some((condition, holds)) = condition.and_then(|flag| Some((flag, implied::by(flag, quantity)?))) {
+            let when = if holds { "every" } else { "no" };
+            return Some(format!("`{quantity}` holds in {when} sample in which `{condition}` holds"));
+        }
+        let range = self.range()?;
+        // With any number of samples, the bound of a share leaves room for others.
+        let is_never_shown = matches!((aggregate, operator), (Aggregate::Upper, Operator::AtMost))
+            && bound <= range.low()
+            || matches!((aggregate, operator), (Aggregate::Lower, Operator::AtLeast)) && bound >= range.high();
+        let (is_always_met, is_never_met) = match operator {
+            Operator::AtMost => (bound >= range.high(), bound < range.low()),
+            Operator::AtLeast => (bound <= range.low(), bound > range.high()),
+        };
+        let says = match (is_always_met, is_never_met || is_never_shown) {
+            (true, _) => "no sample can miss it",
+            (false, true) => "no samples can meet it",
+            (false, false) => return None,
+        };
+        Some(match quantity.measure().filter(|_| !aggregate.is_of_flag()) {
+            Some((measure, in_baseline)) => {
+                format!("{says}: `{}` is {}", measure.name, range_where(measure, in_baseline, condition))
+            }
+            None if aggregate == Aggregate::Count => format!("{says}: a count is 0 or more"),
+            None if is_never_shown => format!("{says}: a share is {range}, and samples show neither end"),
+            None => format!("{says}: a share is {range}"),
+        })
     }
 
     /// Returns the left-hand side, which identifies the judged quantity.
     pub fn subject(&self) -> String {
         let condition = self.condition.map_or_else(String::new, |condition| format!(" | {condition}"));
         format!("{}({}{condition})", self.aggregate, self.quantity)
+    }
+}
+
+/// Returns the range of a number in the samples in which a condition holds.
+fn range_where(measure: &Measure, in_baseline: bool, condition: Option<Quantity>) -> Range {
+    let (low, high) = (measure.range.low(), measure.range.high());
+    match condition {
+        Some(Quantity::Compared(Comparison { measure: of, in_baseline: arm, side, threshold }))
+            if of == measure && arm == in_baseline =>
+        {
+            match side {
+                Side::Above => Range::closed(low.max(threshold), high),
+                Side::Below => Range::closed(low, high.min(threshold)),
+            }
+        }
+        _ => measure.range,
     }
 }
 
@@ -293,7 +349,9 @@ impl FromStr for Expression {
     type Err = ExpressionError;
 
     fn from_str(text: &str) -> Result<Self, ExpressionError> {
-        parse(text).map_err(|problem| ExpressionError { text: text.to_owned(), problem })
+        let problem = |problem| ExpressionError { text: text.to_owned(), problem };
+        let expression = parse(text).map_err(problem)?;
+        expression.foregone().map_or(Ok(expression), |reason| Err(problem(reason)))
     }
 }
 
@@ -332,19 +390,12 @@ fn parse(text: &str) -> Result<Expression, String> {
     if let Some(condition) = condition.filter(|condition| !condition.is_flag()) {
         return Err(format!("the condition `{condition}` is not a flag; flags are {}", flag_names()));
     }
-    let is_share = matches!(aggregate, Aggregate::Share | Aggregate::Lower | Aggregate::Upper);
-    if is_share && !(0.0..=1.0).contains(&bound) {
-        return Err(format!("the bound {bound} of a share is not from 0 to 1"));
-    }
-    if aggregate == Aggregate::Count && bound < 0.0 {
-        return Err(format!("the bound {bound} of a count is below 0"));
-    }
     Ok(Expression { aggregate, quantity, condition, operator, bound })
 }
 
 fn parse_coverage(name: &str, operator: Operator, bound: f64) -> Result<Expression, String> {
     let name: CoverageName = name.parse()?;
-    if operator == Operator::AtMost || !(0.0..=1.0).contains(&bound) {
+    if operator == Operator::AtMost {
         return Err(format!("coverage is asked for as `coverage({name}) >= SHARE`, with a share from 0 to 1"));
     }
     let (aggregate, quantity) = (Aggregate::Coverage, Quantity::Covered(name));
@@ -479,7 +530,7 @@ mod tests {
             "mean(thw_gain_s | goal_in_reach) >= 1.9",
             "share(imposed_braking_mps2 > 3) <= 0.05",
             "upper(imposed_braking_mps2 > 3 | baseline.imposed_braking_mps2 < 3) <= 0.05",
-            "count(min_ttc_rear_s < -0.5) <= 0",
+            "count(min_ttc_rear_s < 0.5) <= 0",
             "coverage(closing-by-class) >= 0.95",
         ] {
             let expression: Expression = text.parse().unwrap();
@@ -502,51 +553,87 @@ mod tests {
     }
 
     #[test]
-    fn a_gate_that_no_sample_can_miss_is_told_from_one_that_samples_meet() {
-        let holds_always = |text: &str| text.parse::<Expression>().unwrap().holds_always(200);
-        for text in [
-            "count(ego_collided) >= 0",
-            "share(ego_collided) <= 1",
-            "share(ego_collided | rear_near) >= 0",
-            "upper(ego_collided) <= 1",
-            "lower(prevented | baseline.ego_collided) >= 0",
-            "coverage(closing-by-class) >= 0",
-            "max(max_jerk_mps3) <= 1e300",
-            "min(min_gap_rear_m) >= -1e300",
-            "mean(harm) >= 0",
-            "min(time_lost_s) >= 0",
-            "max(max_deceleration_mps2) >= 0",
-            "count(imposed_braking_mps2 < 0) <= 0",
-            "share(rear_passed | rear_passed) >= 1",
-            "sum(harm) >= -1",
-            "p99(duration_s) >= 0",
-            "count(harm < -1) <= 0",
-            "share(baseline.impact_speed_mps < 0) <= 0.5",
-            "upper(min_ttc_rear_s < -1e9) <= 0.03",
+    fn a_gate_that_no_sample_can_miss_or_that_no_samples_can_meet_is_refused() {
+        let (always, never) = ("no sample can miss it", "no samples can meet it");
+        for (text, part) in [
+            ("count(ego_collided) >= 0", always),
+            ("share(ego_collided) <= 1", always),
+            ("share(ego_collided | rear_near) >= 0", always),
+            ("upper(ego_collided) <= 1", always),
+            ("lower(prevented | baseline.ego_collided) >= 0", always),
+            ("coverage(closing-by-class) >= 0", always),
+            ("max(max_jerk_mps3) <= 40", "no sample can miss it: `max_jerk_mps3` is a number from 0 to 40"),
+            ("max(max_deceleration_mps2) <= 12", always),
+            ("p95(max_speed_deficit_mps) <= 200", always),
+            ("min(thw_gain_s) >= -1e300", always),
+            ("mean(harm) >= 0", always),
+            ("min(min_thw_rear_s) >= 0", "no sample can miss it: `min_thw_rear_s` is a number from 0 to 1000000"),
+            ("p1(min_ttc_rear_s) >= 0", always),
+            ("min(min_gap_rear_m) >= 0", always),
+            ("max(crossing_braking_mps2) >= 0", always),
+            ("p99(baseline.duration_s) >= 0", always),
+            ("sum(harm) >= -1", always),
+            ("mean(impact_speed_mps | impact_speed_mps > 3) >= 2", always),
+            ("max(min_ttc_rear_s) <= 1e300", always),
+            ("max(harm) <= -1", never),
+            ("min(max_jerk_mps3) >= 41", never),
+            ("sum(harm) <= -0.1", never),
+            ("share(ego_collided) <= -0.5", never),
+            ("share(engaged) >= 1.01", never),
+            ("upper(induced) <= 0", "samples show neither end"),
+            ("lower(engaged) >= 1", never),
+            ("max(harm | harm > 0.5) <= 0.4", never),
+            ("count(imposed_braking_mps2 < 0) <= 0", "holds in no sample: `imposed_braking_mps2` is a number from 0"),
+            ("share(baseline.impact_speed_mps < 0) <= 0.5", "holds in no sample"),
+            ("upper(min_ttc_rear_s < -1e9) <= 0.03", "holds in no sample"),
+            ("share(harm > -1) <= 0.5", "holds in every sample"),
+            ("count(ego_collided | min_gap_rear_m < 0) <= 0", "`min_gap_rear_m < 0` holds in no sample"),
+            ("share(harm > 0.1 | harm > 0.5) >= 0.9", "holds in every sample"),
+            ("share(rear_passed | rear_passed) >= 0.9", "holds in every sample in which `rear_passed` holds"),
+            ("share(ego_collided | ego_collided) <= 0.5", "holds in every sample"),
+            (
+                "count(induced | baseline.ego_collided) <= 0",
+                "holds in no sample in which `baseline.ego_collided` holds",
+            ),
+            ("count(prevented | ego_strikes) <= 0", "holds in no sample"),
         ] {
-            assert!(holds_always(text), "{text}");
+            let error = text.parse::<Expression>().unwrap_err().to_string();
+            assert!(error.contains(part), "{text}: {error}");
         }
         for text in [
             "count(ego_collided) <= 200",
             "count(ego_collided) >= 1",
             "share(ego_collided) <= 0.999",
+            "share(engaged) >= 1",
+            "share(ego_collided) <= 0",
             "lower(prevented | baseline.ego_collided) >= 0.001",
             "coverage(closing-by-class) >= 0.01",
-            "max(max_jerk_mps3) <= 1000",
-            "min(min_gap_rear_m) >= 0",
-            "p99(min_ttc_rear_s) >= 0",
+            "coverage(closing-by-class) >= 1",
+            "max(max_jerk_mps3) <= 39",
+            "max(max_deceleration_mps2) <= 11",
+            "min(min_gap_rear_m) >= 0.01",
+            "p99(min_ttc_rear_s) >= 0.01",
             "mean(thw_gain_s) >= 0",
-            "min(crossing_braking_mps2) >= 0",
-            "count(rear_passed | rear_passed) >= 20",
+            "min(thw_raised_s) >= 0",
             "share(rear_passed | baseline.rear_passed) >= 1",
-            "share(ego_collided | ego_collided) <= 0.5",
             "sum(harm) <= 0.1",
             "mean(harm) <= 0",
+            "max(delta_v_mps) <= 0",
             "count(harm > 0) <= 0",
             "upper(imposed_braking_mps2 > 3) <= 0.05",
+            "mean(impact_speed_mps | impact_speed_mps > 3) >= 3.5",
+            "mean(impact_speed_mps | baseline.impact_speed_mps > 3) >= 2",
         ] {
-            assert!(!holds_always(text), "{text}");
+            assert!(text.parse::<Expression>().is_ok(), "{text}");
         }
+    }
+
+    #[test]
+    fn a_count_as_large_as_the_number_of_samples_is_always_met() {
+        let holds_always = |text: &str| text.parse::<Expression>().unwrap().holds_always(200);
+        assert!(holds_always("count(ego_collided) <= 200") && holds_always("count(ego_collided | engaged) <= 1e9"));
+        assert!(!holds_always("count(ego_collided) <= 199") && !holds_always("count(engaged) >= 200"));
+        assert!(!holds_always("share(ego_collided) <= 0.999"));
     }
 
     #[test]
@@ -571,12 +658,12 @@ mod tests {
             ("count(ego_collided) <= inf", "not a finite number"),
             ("count(min_ttc_rear_s) <= 1", "is a number, which has"),
             ("p99(ego_collided) <= 1", "is a flag, which has"),
-            ("count(ego_collided) <= -1", "the bound -1 of a count is below 0"),
+            ("count(ego_collided) <= -1", "no samples can meet it: a count is 0 or more"),
             ("p101(min_ttc_rear_s) <= 1", "not an aggregate"),
             ("pnan(min_ttc_rear_s) <= 1", "not an aggregate"),
             ("max(min_ttc) <= 1", "not a measure"),
             ("max(harm | harm) <= 1", "not a flag"),
-            ("share(engaged) <= 1.5", "not from 0 to 1"),
+            ("share(engaged) <= 1.5", "no sample can miss it: a share is a number from 0 to 1"),
             ("count ego_collided <= 1", "has the form"),
             ("share(ego_collided > 0) <= 0.1", "is a flag, which has no threshold"),
             ("share(induced > 0) <= 0.1", "is a flag, which has no threshold"),
@@ -585,7 +672,7 @@ mod tests {
             ("share(imposed_braking_mps2 >= 3) <= 0.1", "one `<=` or `>="),
             ("max(imposed_braking_mps2 > 3) <= 1", "is a flag, which has"),
             ("coverage(closing) <= 0.5", "`coverage(closing) >= SHARE`"),
-            ("coverage(closing) >= 1.5", "a share from 0 to 1"),
+            ("coverage(closing) >= 1.5", "no samples can meet it: a share is a number from 0 to 1"),
             ("coverage(Closing) >= 0.5", "not the name of a coverage item"),
             ("coverage(a | b) >= 0.5", "not the name of a coverage item"),
             ("min(closing-by-class) >= 0.5", "not a measure"),

@@ -3,10 +3,11 @@
 //! A measure has one value per sample and arm, or none. A *flag* is a measure that is 0 or 1. If
 //! `outcomes.parquet` has a column for the measure, both have the same name.
 
+use crate::checked::LONGEST_RUN_S;
 use crate::harm::harm;
 use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome, Promise, worse};
 use crate::promise::{Goal, HARD_BRAKING_MPS2, is_due};
-use closecall_traffic::Measured;
+use closecall_traffic::{Environment, GRAVITY_MPS2, LARGEST_JERK_MPS3, Measured, Range};
 
 /// Whether a measure counts or quantifies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,9 @@ pub struct Measure {
     pub name: &'static str,
     /// Whether the measure counts or quantifies.
     pub kind: MeasureKind,
+    /// The values that the measure can have, whatever happens in a run. A bound beyond them judges
+    /// nothing.
+    pub range: Range,
     /// The meaning of the measure, for people.
     pub meaning: &'static str,
     value: fn(&Outcome) -> Option<f64>,
@@ -53,11 +57,6 @@ impl Measure {
         REPORTED.contains(&self.name)
     }
 
-    /// Returns the smallest value that the measure can have, or `None` if there is none.
-    pub fn least(&self) -> Option<f64> {
-        NOT_NEGATIVE.contains(&self.name).then_some(0.0)
-    }
-
     /// Returns the measures that rest on what happened, and not on what a controller reports.
     pub fn measured() -> impl Iterator<Item = &'static Self> {
         MEASURES.iter().filter(|measure| !measure.is_reported())
@@ -72,24 +71,27 @@ impl Measure {
 /// The measures that rest on the states that a controller reports.
 const REPORTED: [&str; 4] = ["engaged", "goal_in_reach", "thw_gain_s", "emergency_braked"];
 
-/// Amount that no measure of a run exceeds, in its unit (s, m, m/s, m/s², m/s³ or deaths): an
-/// assumption; 1e4 to 1e9 are plausible. Only a time to collision may exceed it, if two vehicles
-/// have almost the same speed. The time then says nothing.
-pub(super) const LARGEST: f64 = 1e6;
+/// Amount that no measure of a run exceeds, in its unit (s, m, m/s² or deaths): an assumption; 1e4
+/// to 1e9 are plausible. Only a time to collision may exceed it, if two vehicles have almost the
+/// same speed. The time then says nothing.
+const LARGEST: f64 = 1e6;
+
+/// Largest difference of two speeds (m/s): an assumption, twice the fastest speed that a scenario
+/// file may state; 100 to 1,000 are plausible.
+const LARGEST_SPEED_MPS: f64 = 200.0;
 
 /// The numbers that are 0 or more by definition.
-const NOT_NEGATIVE: [&str; 10] = [
-    "impact_speed_mps",
-    "max_deceleration_mps2",
-    "max_jerk_mps3",
-    "max_speed_deficit_mps",
-    "unprompted_deficit_mps",
-    "time_lost_s",
-    "imposed_braking_mps2",
-    "delta_v_mps",
-    "harm",
-    "duration_s",
-];
+const NOT_NEGATIVE: Range = Range::closed(0.0, LARGEST);
+/// The numbers that may be below 0.
+const SIGNED: Range = Range::closed(-LARGEST, LARGEST);
+/// Differences of two speeds (m/s).
+const SPEED: Range = Range::closed(0.0, LARGEST_SPEED_MPS);
+/// Deceleration of the ego (m/s²): the tyres transmit no more than the friction allows.
+const BRAKING: Range = Range::closed(0.0, Environment::FRICTION.high() * GRAVITY_MPS2);
+/// Jerk of the ego (m/s³): its actuators allow no more.
+const JERK: Range = Range::closed(0.0, LARGEST_JERK_MPS3);
+/// Times of a run (s), which is no longer than a scenario file may state.
+const DURATION: Range = Range::closed(0.0, LONGEST_RUN_S);
 
 /// The flags of a pair of arms on the same sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,11 +131,16 @@ impl PairFlag {
 }
 
 const fn flag(name: &'static str, meaning: &'static str, value: fn(&Outcome) -> Option<f64>) -> Measure {
-    Measure { name, kind: MeasureKind::Flag, meaning, value }
+    Measure { name, kind: MeasureKind::Flag, range: Range::UNIT, meaning, value }
 }
 
-const fn number(name: &'static str, meaning: &'static str, value: fn(&Outcome) -> Option<f64>) -> Measure {
-    Measure { name, kind: MeasureKind::Number, meaning, value }
+const fn number(
+    name: &'static str,
+    range: Range,
+    meaning: &'static str,
+    value: fn(&Outcome) -> Option<f64>,
+) -> Measure {
+    Measure { name, kind: MeasureKind::Number, range, meaning, value }
 }
 
 fn is(happened: bool) -> Option<f64> {
@@ -253,64 +260,74 @@ pub const MEASURES: &[Measure] = &[
     }),
     flag("rear_passed", "the rear vehicle passes the ego", |outcome| reached(outcome, Moment::Concluded)),
     flag("lead_braked", "the lead vehicle brakes", |outcome| reached(outcome, Moment::FrontBrakes)),
-    number("min_thw_front_s", "smallest time headway to the lead vehicle", |outcome| {
+    number("min_thw_front_s", NOT_NEGATIVE, "smallest time headway to the lead vehicle", |outcome| {
         margin(outcome, |margins| margins.min_thw_front_s)
     }),
-    number("min_thw_rear_s", "smallest time headway of the rear vehicle", |outcome| {
+    number("min_thw_rear_s", NOT_NEGATIVE, "smallest time headway of the rear vehicle", |outcome| {
         margin(outcome, |margins| margins.min_thw_rear_s)
     }),
-    number("min_gap_front_m", "smallest gap to the lead vehicle", |outcome| {
+    number("min_gap_front_m", NOT_NEGATIVE, "smallest gap to the lead vehicle", |outcome| {
         margin(outcome, |margins| margins.min_gap_front_m)
     }),
-    number("min_gap_rear_m", "smallest gap of the rear vehicle", |outcome| {
+    number("min_gap_rear_m", NOT_NEGATIVE, "smallest gap of the rear vehicle", |outcome| {
         margin(outcome, |margins| margins.min_gap_rear_m)
     }),
-    number("min_ttc_rear_s", "smallest time to collision of the rear vehicle", |outcome| {
+    number("min_ttc_rear_s", NOT_NEGATIVE, "smallest time to collision of the rear vehicle", |outcome| {
         margin(outcome, |margins| margins.min_ttc_rear_s)
     }),
-    number("min_ttc_front_s", "smallest time to collision with the vehicle ahead", |outcome| {
+    number("min_ttc_front_s", NOT_NEGATIVE, "smallest time to collision with the vehicle ahead", |outcome| {
         outcome.ahead?.min_ttc_front_s.ok()
     }),
     number(
         "impact_speed_mps",
+        SPEED,
         "largest relative speed with which the ego strikes another vehicle; 0 if it strikes none",
         |outcome| Some(outcome.ego_strikes().map(|collision| collision.relative_speed_mps).fold(0.0, worse)),
     ),
-    number("max_deceleration_mps2", "largest deceleration of the ego before it collides", |outcome| {
+    number("max_deceleration_mps2", BRAKING, "largest deceleration of the ego before it collides", |outcome| {
         Some(outcome.margins.max_deceleration_mps2)
     }),
-    number("max_jerk_mps3", "largest jerk of the ego before it collides", |outcome| {
+    number("max_jerk_mps3", JERK, "largest jerk of the ego before it collides", |outcome| {
         Some(outcome.margins.max_jerk_mps3)
     }),
-    number("max_speed_deficit_mps", "most by which the ego is slower than the lead vehicle", |outcome| {
+    number("max_speed_deficit_mps", SPEED, "most by which the ego is slower than the lead vehicle", |outcome| {
         Some(outcome.margins.max_speed_deficit_mps)
     }),
     number(
         "unprompted_deficit_mps",
+        SPEED,
         "most by which the ego is slower than the lead vehicle before a vehicle behind gives a reason, and before the lead vehicle brakes",
         |outcome| cost(outcome, |cost| cost.unprompted_deficit_mps),
     ),
-    number("time_lost_s", "most by which the ego is late before the lead vehicle brakes", |outcome| {
+    number("time_lost_s", DURATION, "most by which the ego is late before the lead vehicle brakes", |outcome| {
         cost(outcome, |cost| cost.time_lost_s)
     }),
     number(
         "imposed_braking_mps2",
+        NOT_NEGATIVE,
         "largest deceleration of the vehicle behind before the lead vehicle brakes",
         |outcome| cost(outcome, |cost| cost.imposed_braking_mps2),
     ),
-    number("delta_v_mps", "largest change of the ego's velocity in a collision; 0 if it does not collide", |outcome| {
-        Some(outcome.ego_delta_v_mps().unwrap_or(0.0))
+    number(
+        "delta_v_mps",
+        SPEED,
+        "largest change of the ego's velocity in a collision; 0 if it does not collide",
+        |outcome| Some(outcome.ego_delta_v_mps().unwrap_or(0.0)),
+    ),
+    number("harm", NOT_NEGATIVE, "driver deaths expected from all collisions of the sample", |outcome| {
+        Some(harm(outcome))
     }),
-    number("harm", "driver deaths expected from all collisions of the sample", |outcome| Some(harm(outcome))),
-    number("duration_s", "duration of the run", |outcome| Some(outcome.duration.s())),
-    number("thw_gain_s", "front time headway gained from the engagement to the critical distance", thw_gain_s),
+    number("duration_s", DURATION, "duration of the run", |outcome| Some(outcome.duration.s())),
+    number("thw_gain_s", SIGNED, "front time headway gained from the engagement to the critical distance", thw_gain_s),
     number(
         "thw_raised_s",
+        SIGNED,
         "front time headway at the critical distance, minus the smallest one until the rear vehicle was near",
         |outcome| promise(outcome, |promise| promise.thw_raised_s),
     ),
     number(
         "crossing_braking_mps2",
+        BRAKING,
         "hardest braking of the ego within 2 s of the crossing of the rear vehicle",
         |outcome| promise(outcome, |promise| promise.crossing_braking_mps2),
     ),

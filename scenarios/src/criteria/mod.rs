@@ -12,6 +12,7 @@
 mod config;
 mod event;
 mod expression;
+mod implied;
 mod measure;
 
 pub use config::{FlagName, GateConfig};

@@ -20,7 +20,9 @@
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
 use closecall_scenarios::lateral_grip_mps2;
-use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, LateralPath, Road, Vehicle, VehicleClass, VehicleState, maths};
+use closecall_traffic::{
+    GRAVITY_MPS2, Indicator, LARGEST_JERK_MPS3, Lane, LateralPath, Road, Vehicle, VehicleClass, VehicleState, maths,
+};
 
 use super::path::{LanePath, LateralState};
 
@@ -71,7 +73,7 @@ impl Capability {
     const fn for_class(class: VehicleClass) -> Self {
         match class {
             VehicleClass::Car => {
-                Self { lag_s: 0.15, jerk_limit_mps3: 40.0, max_acceleration_mps2: 4.0, brake_share: 1.0 }
+                Self { lag_s: 0.15, jerk_limit_mps3: LARGEST_JERK_MPS3, max_acceleration_mps2: 4.0, brake_share: 1.0 }
             }
             VehicleClass::Truck => {
                 Self { lag_s: 0.3, jerk_limit_mps3: 15.0, max_acceleration_mps2: 1.0, brake_share: 0.75 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::Path;
 
-use closecall_scenarios::criteria::{MEASURES, PairFlag};
+use closecall_scenarios::criteria::{MEASURES, MeasureKind, PairFlag};
 use parquet::basic::{LogicalType, Type};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use serde_json::Value;
@@ -171,7 +171,7 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let open = with(&["--paired", "--max-probability", "0.2", "--out", &at("open"), "--record", "worst:1"], 4);
     let certain = with(&["--paired", "--max-probability", "0.6", "--until-certain"], 4);
     // A flag has an interval and a percentile has none; the last gate needs more samples.
-    let gates = ["p1(min_ttc_rear_s) >= 0.0", "lower(prevented | baseline.ego_collided) >= 0.6"];
+    let gates = ["p1(min_ttc_rear_s) >= 0.001", "lower(prevented | baseline.ego_collided) >= 0.6"];
     let gated = ["campaign", headline, "-n", "20", "--seed", "1", "--paired", "--gate", gates[0], "--gate", gates[1]];
     let gated = program(&gated, 4);
     // This scenario expects something of its runs. Its percentile needs more samples.
@@ -335,6 +335,11 @@ fn the_measures_of_gates_are_those_documented() {
     let documented: BTreeSet<&str> = rows.filter_map(|row| row.split('`').next()).collect();
     let names = MEASURES.iter().map(|measure| measure.name).chain(PairFlag::ALL.map(PairFlag::name));
     assert_eq!(documented, names.collect());
+    for number in MEASURES.iter().filter(|measure| measure.kind == MeasureKind::Number) {
+        let (name, range) = (number.name, number.range);
+        let row = section.lines().find(|line| line.starts_with(&format!("| `{name}` |"))).unwrap();
+        assert!(row.ends_with(&format!("| {} to {} |", range.low(), range.high())), "{row}");
+    }
 }
 
 #[test]
