@@ -257,6 +257,9 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
             format!("OVERRIDDEN: {name}: a setting weakened what the scenario is judged by: {weakenings}"),
         );
     }
+    for (name, keys) in judge.unlike_library() {
+        findings.note(format!("{name} differs from the library's scenario of this name in {}", keys.join(", ")));
+    }
     let probabilities = judge_probabilities(summary, judge, &mut findings);
     let gates = judge.gates();
     for gate in &gates {

@@ -74,6 +74,7 @@ pub use fitted_file::FittedFile;
 pub use grip::lateral_grip_mps2;
 pub use intervention::{FaultConfig, IdealConfig, Interventions, MisState};
 pub use logical::{Spreads, logical};
+pub use overridden::COVERAGE as WEAKENED_COVERAGE;
 pub use reenacted::{RearDriver, actor_name, reenact};
 pub use run_key::RunKey;
 pub use sampled::{SampledEncounter, name_of_other, opp2_of, sampled};

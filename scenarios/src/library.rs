@@ -1,5 +1,6 @@
 //! The scenario library: the files of `scenarios/library`, which are part of the program.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
@@ -299,6 +300,22 @@ pub fn copy_of(from: &str, name: &str) -> Result<String, UnknownScenario> {
     Ok(text.replace(&format!("name = \"{from}\""), &format!("name = \"{name}\"")))
 }
 
+/// Returns the keys at the top level in which a file differs from the scenario of the library whose
+/// name it has: another file, or one with settings. What no verdict rests on does not count.
+pub fn differences(file: &ScenarioFile) -> Vec<String> {
+    let name = &file.config().name;
+    let of_library = || ScenarioFile::parse(&path(name), text(name)?, &[]).ok();
+    let Some(of_library) = of_library() else { return Vec::new() };
+    let keys = |file: &ScenarioFile| Table::try_from(file.config()).unwrap_or_default();
+    let (ours, theirs) = (keys(&of_library), keys(file));
+    let names: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
+    let is_other = |key: &&String| ours.get(*key) != theirs.get(*key) && !UNJUDGED.contains(&key.as_str());
+    names.into_iter().filter(is_other).cloned().collect()
+}
+
+/// The keys that change no run and no judgement.
+const UNJUDGED: [&str; 3] = ["description", "tags", "overridden"];
+
 /// Returns the gates that the text of a scenario sets.
 fn gates(text: &str) -> Vec<String> {
     let Ok(document) = text.parse::<Table>() else { return Vec::new() };
@@ -311,6 +328,22 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+
+    #[test]
+    fn a_file_with_the_name_of_the_library_says_what_is_its_own() {
+        let text = text("low-thw-overtake").unwrap();
+        let differences = |text: &str| differences(&ScenarioFile::parse(Path::new("a.toml"), text, &[]).unwrap());
+        assert_eq!(differences(text), Vec::<String>::new());
+        let weaker = text.replacen("upper(induced) <= 0.03", "upper(induced) <= 0.9", 1);
+        assert_eq!(differences(&weaker), ["checks"]);
+        let easier = weaker.replacen("min = 4.0, max = 8.0", "min = 1.0, max = 2.0", 1);
+        assert_eq!(differences(&easier), ["checks", "parameters"]);
+        assert_eq!(differences(&easier.replacen("low-thw-overtake", "own", 1)), Vec::<String>::new(), "another name");
+        for name in names() {
+            let file = ScenarioFile::parse(&path(name), super::text(name).unwrap(), &[]).unwrap();
+            assert!(super::differences(&file).is_empty(), "{name}");
+        }
+    }
 
     #[test]
     fn the_library_holds_every_scenario_of_its_folder() {

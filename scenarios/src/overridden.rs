@@ -6,13 +6,18 @@
 //! and a replay know them as well.
 
 use super::ScenarioConfig;
-use crate::criteria::{Aggregate, Expression, GateConfig};
+use crate::coverage::{Bin, CoverageConfig};
+use crate::criteria::{Expression, GateConfig};
 
 /// The key of the text that names the weakened demands.
 pub(super) const KEY: &str = "overridden";
 
 /// Confidence of the bound of a probability in a file that names none, as of the gate (-).
 const CONFIDENCE: f64 = 0.95;
+
+/// The weakening of what the samples are to cover. It counts if a gate asks for coverage: one of the
+/// scenario file, of a project file, or of the command line.
+pub const COVERAGE: &str = "what is to be covered";
 
 /// Returns what `after` demands less than `before`.
 pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
@@ -32,15 +37,25 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     // A share that is not a number is weaker than any.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
     weakened.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
-    let mut asked = before.checks.values().flatten().chain(&before.gate.require);
-    let asks_coverage = asked.any(|check| check.aggregate == Aggregate::Coverage);
-    weakened.extend((asks_coverage && before.coverage != after.coverage).then(|| "what is to be covered".to_owned()));
+    let is_named = weakened.iter().any(|weakening| weakening == COVERAGE);
+    weakened.extend((!is_named && covered(before) != covered(after)).then(|| COVERAGE.to_owned()));
     let observed = before.parameters.0.iter().filter(|(name, parameter)| {
         let kept = after.parameters.0.get(name).and_then(|parameter| parameter.observed.as_ref());
         parameter.observed.is_some() && kept.is_some_and(|kept| Some(kept) != parameter.observed.as_ref())
     });
     weakened.extend(observed.map(|(name, _)| format!("observed range of {name}")));
     weakened
+}
+
+/// Returns what the samples are to cover: the table, and the bins of its items, which follow from
+/// the labels of the parameters. An empty table asks for nothing.
+fn covered(config: &ScenarioConfig) -> Option<(&CoverageConfig, Vec<Vec<Bin>>)> {
+    let bins = || {
+        let space = config.parameters.check().ok()?;
+        let plan = config.coverage.check(&space).ok()?;
+        Some(plan.items.into_iter().map(|item| item.bins).collect())
+    };
+    (!config.coverage.is_empty()).then(|| (&config.coverage, bins().unwrap_or_default()))
 }
 
 /// Returns the bound of the probability of a collision if `after` bounds it less, or with less
@@ -83,6 +98,29 @@ mod tests {
         ] {
             let weakenings = overridden(&[setting]);
             assert!(weakenings.iter().any(|weakening| weakening.starts_with(part)), "{setting}: {weakenings:?}");
+        }
+    }
+
+    #[test]
+    fn a_setting_that_changes_what_is_to_be_covered_is_named_whoever_asks_for_it() {
+        let coverage = "[coverage.item.closing]\nparameter = 'closing-mps'\nedges = [2, 8, 14]\n\n\
+                        [coverage.item.class]\nparameter = 'rear-class'\n\n[parameters]";
+        let text = library::text("low-thw-overtake").unwrap().replacen("[parameters]", coverage, 1);
+        let overridden = |settings: &[&str]| {
+            let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
+            ScenarioFile::parse(Path::new("a.toml"), &text, &settings).unwrap().config().overridden.clone()
+        };
+        for settings in [
+            &["coverage.item.closing.edges=[2, 14]"][..],
+            &["coverage.item.class.labels=['car']"],
+            &["coverage.item.closing.at-least=2", "duration-s=30"],
+            // The bins of a parameter with labels are its labels.
+            &["rear-class=car"],
+        ] {
+            assert_eq!(overridden(settings), [super::COVERAGE], "{settings:?}");
+        }
+        for setting in ["duration-s=30", "parameters.closing-mps.uniform.min=3"] {
+            assert_eq!(overridden(&[setting]), Vec::<String>::new(), "{setting}");
         }
     }
 

@@ -6,7 +6,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::support::{ROOT, closecall, code, folder, json, message, stdout};
+use crate::support::{ROOT, closecall, code, folder, json, message, program, stdout};
 
 /// Bins of the gap at the start, which decides whether the ego collides: it does below 10 m.
 const GAPS: &str = r#"
@@ -153,4 +153,20 @@ fn bins_that_a_setting_widens_are_overridden_where_a_check_asks_for_them() {
     let weakened = campaign(&path, "--set coverage.item.gap.edges=[0,60]");
     let text = stdout(&weakened, 4);
     assert!(text.contains("OVERRIDDEN") && text.contains("what is to be covered"), "{text}");
+    // Whoever asks: the file, the command line, or a project file.
+    let path = scenario(place.path(), gaps);
+    let wider = "--set coverage.item.gap.edges=[0,60]";
+    assert_eq!(code(&campaign(&path, "--gate coverage(gap)>=1")), 1);
+    let text = stdout(&campaign(&path, &format!("{wider} --gate coverage(gap)>=1")), 4);
+    assert!(text.contains("OVERRIDDEN") && text.contains("what is to be covered"), "{text}");
+    fs::write(place.path().join("closecall.toml"), "[gate]\nrequire = ['coverage(gap) >= 1']\n").unwrap();
+    let in_project = |more: &[&str]| {
+        let words = ["campaign", path.to_str().unwrap(), "--controller", "acc", "-n", "200", "--seed", "3", "--no-out"];
+        program().args(words).args(more).current_dir(place.path()).output().unwrap()
+    };
+    assert_eq!(code(&in_project(&[])), 1);
+    assert!(stdout(&in_project(&["--set", "coverage.item.gap.edges=[0,60]"]), 4).contains("OVERRIDDEN"));
+    // If nobody asks, nothing is weakened.
+    let text = stdout(&campaign(&path, &format!("{wider} --gate count(ego_collided)<=0")), 0);
+    assert!(text.contains("PASS"), "{text}");
 }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use closecall_scenarios::Function;
-use closecall_scenarios::criteria::{Expression, FlagName, Quantity};
+use closecall_scenarios::criteria::{Aggregate, Expression, FlagName, Quantity};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::{Function, WEAKENED_COVERAGE, library};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 
@@ -51,6 +51,8 @@ struct Judged {
     happened: u64,
     samples: u64,
     overridden: Vec<String>,
+    /// What sets the scenario apart from the library's scenario of the same name.
+    unlike_library: Vec<String>,
     /// Whether the scenario asks for collisions that the system under test prevents.
     asks_for_action: bool,
     /// The function that the scenario judges.
@@ -93,7 +95,9 @@ fn other_baseline(work: &Work) -> Option<String> {
 /// Returns what the settings, the gates and the baseline of a campaign demand less than the
 /// scenario file, or than the project file. A measurement demands nothing.
 fn overridden(work: &Work, set: &GateSet) -> Vec<String> {
-    let settings = work.file.config().overridden.iter().cloned();
+    let asks_coverage = set.of_scenario(&work.file).iter().any(|gate| gate.expression.aggregate == Aggregate::Coverage);
+    let counts = |weakening: &&String| asks_coverage || *weakening != WEAKENED_COVERAGE;
+    let settings = work.file.config().overridden.iter().filter(counts).cloned();
     settings.chain(set.weakened_in(&work.file)).chain(other_baseline(work)).collect()
 }
 
@@ -115,6 +119,7 @@ impl Judge {
                 happened: 0,
                 samples: 0,
                 overridden: overridden(work, set),
+                unlike_library: library::differences(&work.file),
                 asks_for_action: asks_for_action(config),
                 function: config.function,
                 extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
@@ -163,6 +168,13 @@ impl Judge {
     pub fn overridden(&self) -> impl Iterator<Item = (&str, &[String])> {
         let judged = self.scenarios.iter().filter(|judged| !judged.overridden.is_empty());
         judged.map(|judged| (judged.scenario.as_str(), judged.overridden.as_slice()))
+    }
+
+    /// Returns the scenarios that have the name of a scenario of the library and are another one,
+    /// with the keys in which they differ.
+    pub fn unlike_library(&self) -> impl Iterator<Item = (&str, &[String])> {
+        let judged = self.scenarios.iter().filter(|judged| !judged.unlike_library.is_empty());
+        judged.map(|judged| (judged.scenario.as_str(), judged.unlike_library.as_slice()))
     }
 
     /// Returns the names of the scenarios.
