@@ -12,6 +12,7 @@
 //! whole folders instead, bit for bit.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::Path;
 
 use closecall_scenarios::sampling::Design;
@@ -27,7 +28,7 @@ use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
-const BASELINE_VERSION: u32 = 3;
+const BASELINE_VERSION: u32 = 4;
 
 /// The results of a campaign that a repository keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,7 +65,7 @@ pub struct ScenarioBaseline {
     pub collisions: u64,
     /// Number of samples that end in an error.
     pub errors: u64,
-    /// The samples in which the ego collides or that end in an error, in ascending order.
+    /// The samples in which vehicles collide or that end in an error, in ascending order.
     pub failing: Vec<u64>,
     /// Quantiles of each margin, over the samples that have it (s or m).
     pub margins: BTreeMap<String, BTreeMap<String, f64>>,
@@ -85,13 +86,6 @@ pub enum BaselineError {
         /// Its value in the campaign.
         current: String,
     },
-}
-
-impl ScenarioBaseline {
-    /// Returns true if every sample ended in an error.
-    const fn has_no_outcome(&self) -> bool {
-        self.errors == self.samples
-    }
 }
 
 impl Baseline {
@@ -134,7 +128,14 @@ impl Baseline {
     /// [`FolderError`] if the file cannot be read, has another version of the layout, or was
     /// edited.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
-        let text = read_text(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
+        let text = read_text(path).map_err(|source| {
+            let is_folder = source.kind() == io::ErrorKind::IsADirectory;
+            let source = match is_folder {
+                true => io::Error::new(source.kind(), "it is a folder, and the file of a baseline is needed"),
+                false => source,
+            };
+            FolderError::Read { path: path.to_owned(), source }
+        })?;
         let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };
         // The version comes first: another layout has other keys.
         let value: Value = serde_json::from_str(&text).map_err(|error| {
@@ -206,11 +207,14 @@ impl Baseline {
         }
         let is_new = |name: &&String| !self.scenarios.contains_key(*name);
         let new_scenarios = current.scenarios.keys().filter(is_new).cloned().collect();
-        let has_no_outcome =
-            |scenario: &&ScenarioBaselineComparison| current.scenarios[&scenario.scenario].has_no_outcome();
-        let without_outcome =
-            compared.iter().filter(has_no_outcome).map(|scenario| scenario.scenario.clone()).collect();
-        Ok(BaselineComparison { scenarios: compared, new_scenarios, without_outcome })
+        let errors = |(name, before): (&String, &ScenarioBaseline)| SampleErrors {
+            scenario: name.clone(),
+            samples: before.samples,
+            baseline: before.errors,
+            current: current.scenarios.get(name).map_or(0, |after| after.errors),
+        };
+        let not_compared = self.scenarios.iter().map(errors).filter(SampleErrors::hide_a_sample).collect();
+        Ok(BaselineComparison { scenarios: compared, new_scenarios, not_compared })
     }
 }
 
@@ -242,8 +246,30 @@ pub struct BaselineComparison {
     pub scenarios: Vec<ScenarioBaselineComparison>,
     /// The scenarios that the baseline does not have.
     pub new_scenarios: Vec<String>,
-    /// The scenarios of the baseline whose samples all end in an error in the later campaign.
-    pub without_outcome: Vec<String>,
+    /// The scenarios of which some samples are not compared, because they end in an error in the
+    /// baseline or in the later campaign.
+    pub not_compared: Vec<SampleErrors>,
+}
+
+/// The samples of a scenario that end in an error and are not compared.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SampleErrors {
+    /// The scenario's name.
+    pub scenario: String,
+    /// Number of samples.
+    pub samples: u64,
+    /// Number of samples that end in an error in the baseline.
+    pub baseline: u64,
+    /// Number of samples that end in an error in the later campaign.
+    pub current: u64,
+}
+
+impl SampleErrors {
+    /// Returns true if some sample is not compared. The file does not tell an error from a
+    /// collision: a sample that ended in an error there and collides now does not newly fail.
+    const fn hide_a_sample(&self) -> bool {
+        self.baseline > 0 || self.current > 0 || self.samples == 0
+    }
 }
 
 impl BaselineComparison {
@@ -252,10 +278,10 @@ impl BaselineComparison {
         self.scenarios.iter().any(|scenario| !scenario.newly_failing.is_empty() || !scenario.margins.is_empty())
     }
 
-    /// Returns true if the later campaign has outcomes of every scenario of the baseline, and the
-    /// baseline has a scenario. Without outcomes nothing is compared.
+    /// Returns true if all samples of the baseline's scenarios have an outcome in both campaigns,
+    /// and the baseline has a scenario. A sample without an outcome is no evidence.
     pub fn is_compared(&self) -> bool {
-        self.without_outcome.is_empty() && !self.scenarios.is_empty()
+        self.not_compared.is_empty() && !self.scenarios.is_empty()
     }
 
     /// Returns true if a sample fails in the baseline and passes in the later campaign.
@@ -294,8 +320,8 @@ impl Collected {
         result.samples += 1;
         match &arm.result {
             Ok(outcome) => {
-                if outcome.ego_collided() {
-                    result.collisions += 1;
+                result.collisions += u64::from(outcome.ego_collided());
+                if outcome.any_collided() {
                     result.failing.push(sample);
                 }
                 for (values, Margin { value, .. }) in self.values.iter_mut().zip(MARGINS) {
@@ -359,19 +385,21 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_all_end_in_an_error_are_not_compared() {
-        let mut failing = baseline(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 4.0);
-        let scenario = failing.scenarios.get_mut("headline").unwrap();
-        scenario.errors = 9;
-        let comparison =
-            |current: &Baseline| baseline(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 4.0).compare(current, 0.05).unwrap();
-        assert!(comparison(&failing).is_compared(), "one sample has an outcome");
-        failing.scenarios.get_mut("headline").unwrap().errors = 10;
-        let nothing = comparison(&failing);
-        assert!(!nothing.is_regression() && !nothing.is_compared());
-        assert_eq!(nothing.without_outcome, ["headline"]);
-        let empty = Baseline { scenarios: BTreeMap::new(), ..failing.clone() };
-        assert!(!empty.compare(&failing, 0.05).unwrap().is_compared(), "a baseline without a scenario");
+    fn samples_that_end_in_an_error_on_either_side_are_not_compared() {
+        let with_errors = |errors: u64| {
+            let mut baseline = baseline(&[0, 1, 2], 4.0);
+            baseline.scenarios.get_mut("headline").unwrap().errors = errors;
+            baseline
+        };
+        assert!(with_errors(0).compare(&with_errors(0), 0.05).unwrap().is_compared());
+        for [before, after] in [[1, 1], [0, 1], [1, 0], [10, 10]] {
+            let comparison = with_errors(before).compare(&with_errors(after), 0.05).unwrap();
+            assert!(!comparison.is_regression() && !comparison.is_compared(), "{before} and {after} errors");
+            let [errors] = &comparison.not_compared[..] else { panic!("{comparison:?}") };
+            assert_eq!((errors.scenario.as_str(), errors.baseline, errors.current), ("headline", before, after));
+        }
+        let empty = Baseline { scenarios: BTreeMap::new(), ..with_errors(0) };
+        assert!(!empty.compare(&with_errors(0), 0.05).unwrap().is_compared(), "a baseline without a scenario");
     }
 
     #[test]
@@ -435,7 +463,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("baseline.json");
         let cases =
-            [("", "it is empty"), ("{\"a\": 1}", "of version 3"), ("a = 1", "is not a baseline: expected value")];
+            [("", "it is empty"), ("{\"a\": 1}", "of version 4"), ("a = 1", "is not a baseline: expected value")];
         for (text, expected) in cases {
             std::fs::write(&path, text).unwrap();
             let error = Baseline::read(&path).unwrap_err().to_string();

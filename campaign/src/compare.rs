@@ -111,16 +111,19 @@ pub struct ScenarioComparison {
     pub outcomes: u64,
     /// Number of samples whose outcomes agree to the last bit, the controller's name aside.
     pub same: u64,
-    /// Samples in which the ego collides in the later campaign and not in the baseline.
+    /// Samples in which vehicles collide in the later campaign and not in the baseline. A controller
+    /// that protects the ego at the expense of others gains nothing.
     pub newly_failing: Vec<u64>,
-    /// Samples in which the ego collides in the baseline and not in the later campaign.
+    /// Samples in which vehicles collide in the baseline and not in the later campaign.
     pub fixed: Vec<u64>,
-    /// Number of samples in which the ego collides in both campaigns.
+    /// Number of samples in which vehicles collide in both campaigns.
     pub still_failing: u64,
     /// Samples that end in an error in the later campaign and not in the baseline.
     pub newly_in_error: Vec<u64>,
     /// Samples that end in an error in the baseline and not in the later campaign.
     pub no_longer_in_error: Vec<u64>,
+    /// Samples that end in an error in both campaigns.
+    pub still_in_error: Vec<u64>,
     /// The changes of the margins.
     pub margins: Vec<MarginChange>,
 }
@@ -144,6 +147,7 @@ impl ScenarioComparison {
             still_failing: 0,
             newly_in_error: Vec::new(),
             no_longer_in_error: Vec::new(),
+            still_in_error: Vec::new(),
             margins: MARGINS.map(unchanged).to_vec(),
         }
     }
@@ -160,7 +164,7 @@ impl ScenarioComparison {
         self.same += u64::from(is_same(baseline, current));
         match (&baseline.result, &current.result) {
             (Ok(before), Ok(after)) => {
-                match (before.ego_collided(), after.ego_collided()) {
+                match (before.any_collided(), after.any_collided()) {
                     (false, true) => self.newly_failing.push(sample),
                     (true, false) => self.fixed.push(sample),
                     (true, true) => self.still_failing += 1,
@@ -176,11 +180,11 @@ impl ScenarioComparison {
             (Err(_), Ok(after)) => {
                 self.no_longer_in_error.push(sample);
                 // Without an outcome in the baseline, a collision counts as new.
-                if after.ego_collided() {
+                if after.any_collided() {
                     self.newly_failing.push(sample);
                 }
             }
-            (Err(_), Err(_)) => {}
+            (Err(_), Err(_)) => self.still_in_error.push(sample),
         }
     }
 }
@@ -203,8 +207,7 @@ pub enum Regression {
     None,
     /// Samples end in an error that had an outcome. This takes precedence over [`Self::Worse`].
     NewErrors,
-    /// All samples of some scenario end in an error, as in the earlier campaign: nothing is
-    /// compared there.
+    /// Some samples end in an error, as in the earlier campaign: they are not compared.
     NotCompared,
     /// More samples fail than allowed, or a margin has shrunk.
     Worse,
@@ -220,7 +223,7 @@ impl Regression {
             Self::NewErrors
         } else if newly_failing as u64 > max_newly_failing || has_lost_margin {
             Self::Worse
-        } else if scenarios.is_empty() || scenarios.iter().any(|scenario| scenario.outcomes == 0) {
+        } else if scenarios.is_empty() || scenarios.iter().any(|scenario| scenario.outcomes < scenario.samples) {
             Self::NotCompared
         } else {
             Self::None
@@ -308,6 +311,9 @@ mod tests {
         (0..4).for_each(|sample| scenario.push(sample, &failed, &failed));
         assert_eq!((scenario.outcomes, scenario.same), (0, 4));
         assert_eq!(Regression::of(&[scenario.clone()], 0, 0.05), Regression::NotCompared);
+        assert_eq!(scenario.still_in_error, [0, 1, 2, 3]);
+        let in_part = ScenarioComparison { outcomes: 3, ..scenario.clone() };
+        assert_eq!(Regression::of(&[in_part], 0, 0.05), Regression::NotCompared);
         let compared = ScenarioComparison { outcomes: 4, ..scenario.clone() };
         assert_eq!(Regression::of(std::slice::from_ref(&compared), 0, 0.05), Regression::None);
         assert_eq!(Regression::of(&[compared, scenario], 0, 0.05), Regression::NotCompared);

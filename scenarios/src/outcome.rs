@@ -511,6 +511,11 @@ impl Outcome {
         self.collisions.iter().any(|collision| !collision.involves(&self.ego))
     }
 
+    /// Returns whether any two vehicles collided with each other.
+    pub fn any_collided(&self) -> bool {
+        !self.collisions.is_empty()
+    }
+
     /// Returns whether the ego was part of a collision. Gates count samples for which this holds.
     pub fn ego_collided(&self) -> bool {
         self.ego_collisions().next().is_some()

@@ -104,6 +104,7 @@ fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<Ex
                 "tolerance": tolerance,
                 "scenarios": comparison.scenarios,
                 "new_scenarios": comparison.new_scenarios,
+                "not_compared": comparison.not_compared,
             });
             outln!("{:#}", stamped(object, Some(current.seed), None));
         }

@@ -19,10 +19,10 @@ fn compare(baseline: &Path, other: &Path, more: &[&str]) -> std::process::Output
     closecall(folders.iter().chain(more))
 }
 
-/// Returns the samples of a campaign's journal in which the ego collided.
+/// Returns the samples of a campaign's journal in which vehicles collided.
 fn failing(folder: &Path) -> Vec<u64> {
     let collided = |record: &closecall_campaign::record::Record| {
-        record.arms.last().unwrap().result.as_ref().unwrap().ego_collided()
+        record.arms.last().unwrap().result.as_ref().unwrap().any_collided()
     };
     records(folder).into_iter().filter(collided).map(|record| record.sample).collect()
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_campaign::baseline::{BaselineComparison, ScenarioBaselineComparison};
+use closecall_campaign::baseline::{BaselineComparison, SampleErrors, ScenarioBaselineComparison};
 use closecall_campaign::compare::{Means, ScenarioComparison};
 use closecall_campaign::margins::MarginRegression;
 use closecall_traffic::words::counted;
@@ -43,6 +43,9 @@ impl fmt::Display for ComparisonText<'_> {
             if !scenario.no_longer_in_error.is_empty() {
                 write_list(f, "no longer in error", &scenario.no_longer_in_error)?;
             }
+            if !scenario.still_in_error.is_empty() {
+                write_list(f, "in error in both, and not compared", &scenario.still_in_error)?;
+            }
             for margin in &scenario.margins {
                 let Some(Means { baseline, current }) = margin.means() else { continue };
                 write!(f, "  {:<16} mean {baseline:.3}, now {current:.3} ({:+.3})", margin.key, current - baseline)?;
@@ -77,8 +80,12 @@ impl fmt::Display for BaselineText<'_> {
         for scenario in &self.0.new_scenarios {
             writeln!(f, "{scenario}: not in the baseline, and not compared")?;
         }
-        for scenario in &self.0.without_outcome {
-            writeln!(f, "{scenario}: every sample ended in an error, and nothing was compared")?;
+        for SampleErrors { scenario, samples, baseline, current } in &self.0.not_compared {
+            writeln!(
+                f,
+                "{scenario}: not compared: of {}, {baseline} ended in an error in the baseline, and now {current}",
+                counted(*samples, "sample")
+            )?;
         }
         writeln!(
             f,

@@ -31,6 +31,7 @@ pub fn comparison(scenarios: &[ScenarioComparison], differences: &[String], tole
             "still_failing": scenario.still_failing,
             "newly_in_error": scenario.newly_in_error,
             "no_longer_in_error": scenario.no_longer_in_error,
+            "still_in_error": scenario.still_in_error,
             "margins": margins,
             "margin_regressions": scenario.margin_regressions(tolerance),
         });
