@@ -496,7 +496,7 @@ fn rare_campaign(args: &CampaignArgs, method: Method) -> Result<ExitCode, CliErr
         method,
         args: &args.rare,
         budget: args.plan.named_samples(),
-        gate: args.gates.probability()?,
+        gates: args.gates.gates(controllers.len() > 1, args.design.plain(), None)?,
         ray: args.ray.as_deref(),
         folder,
         resume: args.results.is_resumed(),

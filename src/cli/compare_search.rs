@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use clap::Args;
 use closecall_campaign::arguments::{Jobs, count};
+use closecall_campaign::gate::GateSet;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::rare::Method;
 use closecall_campaign::runner::Sampling;
@@ -112,7 +113,8 @@ impl SearchArgs {
             method: Method::Search,
             args: &RareArgs::of(event),
             budget: self.samples,
-            gate: None,
+            // The event judges by itself, whatever gates the campaigns had.
+            gates: GateSet { is_measurement: true, ..GateSet::default() },
             ray: None,
             folder: self.out.as_deref(),
             resume: self.resume,

@@ -12,6 +12,7 @@ use closecall_report::campaign::{
     CampaignReport, CountsText, CoverageText, FlakyText, Tally, VerdictText, ensemble_text,
 };
 use closecall_report::json;
+use closecall_scenarios::criteria::EventError;
 use closecall_studies::fidelity::Fidelity;
 use serde_json::json;
 
@@ -23,7 +24,7 @@ use super::fast_samples::FastParts;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{during, outln, print_error, print_text};
-use super::rare::{Rare, RareArgs};
+use super::rare::{Rare, RareArgs, Results};
 use super::results::{ArtifactArgs, print_results, remember, selection};
 use super::saved::TrustArgs;
 use crate::exit_code::ExitCode;
@@ -73,22 +74,26 @@ fn merge_rare(args: &MergeArgs, parts: &RareParts) -> Result<ExitCode, CliError>
             "the runs of a rare event are not independent samples of the scenario: their parts cannot be merged with {option}"
         )));
     }
-    let (gate, manifest) = (args.gates.probability()?, parts.manifest());
+    let manifest = parts.manifest();
     let works = works(&args.parts[0], &manifest.campaign)?;
+    let is_paired = works.iter().all(|work| work.arms.len() > 1);
+    let gates = args.gates.gates(is_paired, manifest.campaign.sampling.design, None)?;
+    let event = manifest.event.parse().map_err(|error: EventError| CliError::usage(error.to_string()))?;
     let reports = parts.estimate(&works)?;
     let folder = parts.write(&args.out, session::arguments(), args.resume)?;
     let rare = Rare {
         method: manifest.method,
         args: &RareArgs::default(),
         budget: Some(manifest.budget),
-        gate,
+        gates,
         ray: None,
         folder: Some(&args.out),
         resume: args.resume,
         format: args.format,
         can_draw_seed: false,
     };
-    rare.conclude(&reports, &works, &manifest.campaign, Some(&folder))
+    let results = Results { event, reports: &reports, works: &works };
+    rare.conclude(results, &manifest.campaign, Some(&folder))
 }
 
 pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {

@@ -25,7 +25,7 @@ use closecall_campaign::session;
 use closecall_report::json::stamped;
 use closecall_scenarios::criteria::{EGO_COLLIDED, EventExpression, Guide, PairFlag, Quantity};
 use closecall_scenarios::sampling::Design;
-use closecall_scenarios::{Setting, library};
+use closecall_scenarios::{Setting, WEAKENED_COVERAGE, library};
 use closecall_sensors::SensorMode;
 use closecall_studies::case::Case;
 use closecall_studies::minimize::{MinimizedText, minimize, output_files, with_choice, write_files};
@@ -124,7 +124,8 @@ pub(super) struct Rare<'a> {
     pub(super) args: &'a RareArgs,
     /// Largest number of runs of each scenario.
     pub(super) budget: Option<u64>,
-    pub(super) gate: Option<ProbabilityGate>,
+    /// The gates of the command line and of the project files.
+    pub(super) gates: GateSet,
     /// The cluster that runs the runs, if this machine does not.
     pub(super) ray: Option<&'a str>,
     /// The folder for the results, if they are kept.
@@ -167,14 +168,15 @@ impl Rare<'_> {
     /// Samples the event in every scenario of a plan, and prints the estimates.
     pub(super) fn run(&self, plan: &Plan) -> Result<ExitCode, CliError> {
         let nearness = self.args.nearness(self.method)?;
-        if self.method == Method::Search && (self.gate.is_some() || self.args.relative_width.is_some()) {
+        let has_gate = self.gates.probability.as_ref().is_some_and(|spec| spec.source == GateSource::CommandLine);
+        if self.method == Method::Search && (has_gate || self.args.relative_width.is_some()) {
             return Err(CliError::usage(
                 "--design search states no probability: --max-probability and --relative-width belong to --design importance or subset",
             ));
         }
         let campaign = plan.campaign();
         if let Some(work) = campaign.works.first() {
-            check_event(nearness.expression(), work, self.gate.is_some())?;
+            check_event(nearness.expression(), work, has_gate)?;
         }
         check_backend(plan.uses_classifier())?;
         check_networks(plan.crop_networks(), plan.mask_rcnn_cameras())?;
@@ -217,7 +219,8 @@ impl Rare<'_> {
             self.print_part(part, &runs_of_part, manifest.campaign.sampling.seed);
             return Ok(ExitCode::Pass);
         }
-        let code = self.conclude(&reports, &campaign.works, &manifest.campaign, folder.as_ref())?;
+        let results = Results { event: nearness.expression(), reports: &reports, works: &campaign.works };
+        let code = self.conclude(results, &manifest.campaign, folder.as_ref())?;
         if self.method == Method::Search {
             for (report, work) in reports.iter().zip(&campaign.works) {
                 self.minimize(report, work, &manifest.campaign, nearness.expression())?;
@@ -229,43 +232,81 @@ impl Rare<'_> {
     /// Prints the estimates, and writes them into the folder.
     pub(super) fn conclude(
         &self,
-        reports: &[RareReport],
-        works: &[Arc<Work>],
+        results: Results<'_>,
         manifest: &Manifest,
         folder: Option<&RareFolder>,
     ) -> Result<ExitCode, CliError> {
-        let reports: Vec<RareReport> =
-            reports.iter().zip(works).map(|(report, work)| self.with_weakened(report, work)).collect();
-        let reports = &reports[..];
+        let Results { event, reports, works } = results;
+        let judged = |(report, work): (&RareReport, &Arc<Work>)| {
+            let gate = self.gate_of(event, work);
+            Judged {
+                report: if gate.is_some() { self.with_weakened(event, report, work) } else { report.clone() },
+                gate,
+            }
+        };
+        let judged: Vec<Judged> = reports.iter().zip(works).map(judged).collect();
         // A search has no gate, and judges by its exit code.
-        let judges = self.gate.is_some() || self.method == Method::Search;
-        let remark = known_seed(judges, manifest, self.can_draw_seed);
+        let judges = judged.iter().any(|judged| judged.gate.is_some()) || self.method == Method::Search;
+        let known = known_seed(judges, manifest, self.can_draw_seed);
+        let remarks: Vec<String> = known.into_iter().chain(self.not_judged(event, works)).collect();
         let seed = works.first().map(|work| work.sampling.seed);
-        let result = self.json(reports, seed, remark.as_deref());
+        let result = json_of(&judged, seed, &remarks);
         if let Some(folder) = folder {
             print_written(&folder.write(&result)?);
         }
         match self.format {
             Format::Json => outln!("{result:#}"),
             Format::Human => {
-                self.print(reports, works, manifest.sensors);
-                remark.iter().for_each(|remark| textln!("  {remark}"));
+                print(&judged, works, manifest.sensors);
+                remarks.iter().for_each(|remark| textln!("  {remark}"));
                 if manifest.has_drawn_seed {
                     textln!("  drawn for this campaign: --seed {}", manifest.sampling.seed);
                 }
             }
         }
-        Ok(ExitCode::first_of(reports.iter().map(|report| self.code(report))))
+        Ok(ExitCode::first_of(judged.iter().map(Judged::code)))
+    }
+
+    /// Returns the gate by which the event is judged in a scenario. The gate of a project file or of
+    /// the scenario file bounds the probability of a collision of the ego, and of no other event.
+    fn gate_of(&self, event: EventExpression, work: &Work) -> Option<ProbabilityGate> {
+        if self.method == Method::Search {
+            return None;
+        }
+        let of_command_line = |spec: &ProbabilitySpec| spec.source == GateSource::CommandLine;
+        let spec = match is_collision(event) {
+            true => self.gates.probability_of(&work.file),
+            false => self.gates.probability.clone().filter(of_command_line),
+        };
+        spec.map(|spec| spec.gate)
+    }
+
+    /// Returns the gates of the project files and of the scenario files that the event does not
+    /// judge, in words.
+    fn not_judged(&self, event: EventExpression, works: &[Arc<Work>]) -> Option<String> {
+        if self.gates.is_measurement {
+            return None;
+        }
+        let criteria = self.gates.specs.iter().map(|spec| format!("{} ({})", spec.expression, spec.source));
+        let mut unjudged: Vec<String> = criteria.collect();
+        for work in works {
+            let spec = self.gates.probability_of(&work.file);
+            let spec = spec.filter(|spec| spec.source != GateSource::CommandLine);
+            if let Some(spec) = spec.filter(|_| self.gate_of(event, work).is_none()) {
+                let text = format!("max-probability {} of a collision ({})", spec.gate.max(), spec.source);
+                unjudged.extend((!unjudged.contains(&text)).then_some(text));
+            }
+        }
+        (!unjudged.is_empty()).then(|| format!("not judged by --design {}: {}", self.method, unjudged.join("; ")))
     }
 
     /// Returns a report that says what settings or the gate of the command line demand less than the
-    /// file of the scenario: a low probability then does not pass.
-    fn with_weakened(&self, report: &RareReport, work: &Work) -> RareReport {
+    /// file of the scenario or a project file: a low probability then does not pass.
+    fn with_weakened(&self, event: EventExpression, report: &RareReport, work: &Work) -> RareReport {
         let mut report = report.clone();
-        let Some(gate) = self.gate else { return report };
-        let probability = Some(ProbabilitySpec { gate, source: GateSource::CommandLine });
-        let of_gate = GateSet { probability, ..GateSet::default() }.weakened_in(&work.file);
-        let weakened: Vec<String> = work.file.config().overridden.iter().cloned().chain(of_gate).collect();
+        let of_settings = work.file.config().overridden.iter().filter(|weakening| *weakening != WEAKENED_COVERAGE);
+        let of_gates = if is_collision(event) { self.gates.weakened_in(&work.file) } else { Vec::new() };
+        let weakened: Vec<String> = of_settings.cloned().chain(of_gates).collect();
         if !weakened.is_empty() {
             let weakened = weakened.join("; ");
             report.not_judged.push(format!("a setting weakened what the scenario is judged by: {weakened}"));
@@ -318,63 +359,6 @@ impl Rare<'_> {
         session::received().map_or(ExitCode::Interrupted, ExitCode::from)
     }
 
-    fn code(&self, report: &RareReport) -> ExitCode {
-        if report.errors > 0 {
-            return ExitCode::SampleError;
-        }
-        if let Some(search) = report.search {
-            return match search.has_event {
-                true => ExitCode::Fail,
-                // An event that cannot happen, or that hardly any run looked for, is not found either.
-                false if !report.not_judged.is_empty() || report.runs < LEAST_SAMPLES => ExitCode::Inconclusive,
-                false => ExitCode::Pass,
-            };
-        }
-        match (&self.gate, report.main()) {
-            (Some(_), _) => match self.judge(report) {
-                Some(true) if report.not_judged.is_empty() => ExitCode::Pass,
-                Some(false) => ExitCode::Fail,
-                Some(true) | None => ExitCode::Inconclusive,
-            },
-            (None, Some(_)) => ExitCode::Pass,
-            (None, None) => ExitCode::Inconclusive,
-        }
-    }
-
-    /// Returns whether the probability is as low as allowed; `None` if the interval does not say
-    /// it, or there is no gate.
-    fn judge(&self, report: &RareReport) -> Option<bool> {
-        let gate = self.gate.filter(|_| report.errors == 0)?;
-        let Some(estimate) = report.main() else {
-            // The bound without an event has 95 % confidence.
-            let bound = report.upper_bound_without_event.filter(|_| gate.confidence() <= 0.95)?;
-            return (bound <= gate.max()).then_some(true);
-        };
-        let (low, high) = (estimate.mean.lower_bound(gate.confidence())?, report.upper_bound(gate.confidence())?);
-        if high <= gate.max() { Some(true) } else { (low >= gate.max()).then_some(false) }
-    }
-
-    /// Returns the verdict on a report.
-    fn word(&self, report: &RareReport) -> &'static str {
-        match self.judge(report) {
-            _ if report.errors > 0 => "ERROR",
-            Some(true) if !report.not_judged.is_empty() => "NOT JUDGED",
-            Some(true) => "PASS",
-            Some(false) => "FAIL",
-            None => "INCONCLUSIVE",
-        }
-    }
-
-    /// Returns the result for programs.
-    fn json(&self, reports: &[RareReport], seed: Option<u64>, remark: Option<&str>) -> Value {
-        let verdicts = self.gate.map(|gate| {
-            let words: Vec<&str> = reports.iter().map(|report| self.word(report)).collect();
-            json!({ "max_probability": gate.max(), "confidence": gate.confidence(), "verdicts": words })
-        });
-        let remarks: Vec<&str> = remark.into_iter().collect();
-        stamped(json!({ "scenarios": reports, "gate": verdicts, "remarks": remarks }), seed, None)
-    }
-
     /// Reduces the case that a search has found to the smallest one, and writes it as a scenario into
     /// the folder. An event without a collision is not reduced.
     fn minimize(
@@ -408,31 +392,120 @@ impl Rare<'_> {
         [Some(&files.failing), files.twin.as_ref()].into_iter().flatten().for_each(|path| print_written(path));
         Ok(())
     }
+}
 
-    fn print(&self, reports: &[RareReport], works: &[Arc<Work>], sensors: Option<SensorMode>) {
-        for (report, work) in reports.iter().zip(works) {
-            print_text(report);
-            if let Some(gate) = self.gate {
-                let verdict = self.word(report);
-                let (max, confidence) = (gate.max(), percent(gate.confidence()));
-                if let Some(bound) = report.upper_bound(gate.confidence()).filter(|_| report.is_doubtful()) {
-                    textln!(
-                        "  judged by an upper bound that holds for any weights, because the estimate is doubtful: {bound:.3e}"
-                    );
-                }
-                textln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
+/// Returns true for the event that a collision gate bounds.
+fn is_collision(event: EventExpression) -> bool {
+    matches!(event.first.quantity, Quantity::Tested(measure) if measure.name == EGO_COLLIDED) && event.second.is_none()
+}
+
+/// What the runs of a rare event come to.
+#[derive(Clone, Copy)]
+pub(super) struct Results<'a> {
+    /// The event.
+    pub(super) event: EventExpression,
+    /// The report on each scenario.
+    pub(super) reports: &'a [RareReport],
+    /// The scenarios.
+    pub(super) works: &'a [Arc<Work>],
+}
+
+/// A report with the gate that judges it.
+struct Judged {
+    report: RareReport,
+    gate: Option<ProbabilityGate>,
+}
+
+impl Judged {
+    /// Returns the exit code.
+    fn code(&self) -> ExitCode {
+        let report = &self.report;
+        if report.errors > 0 {
+            return ExitCode::SampleError;
+        }
+        if let Some(search) = report.search {
+            return match search.has_event {
+                true => ExitCode::Fail,
+                // An event that cannot happen, or that hardly any run looked for, is not found either.
+                false if !report.not_judged.is_empty() || report.runs < LEAST_SAMPLES => ExitCode::Inconclusive,
+                false => ExitCode::Pass,
+            };
+        }
+        match (&self.gate, report.main()) {
+            (Some(_), _) => match self.is_low() {
+                Some(true) if report.not_judged.is_empty() => ExitCode::Pass,
+                Some(false) => ExitCode::Fail,
+                Some(true) | None => ExitCode::Inconclusive,
+            },
+            (None, Some(_)) => ExitCode::Pass,
+            (None, None) => ExitCode::Inconclusive,
+        }
+    }
+
+    /// Returns whether the probability is as low as allowed; `None` if the interval does not say
+    /// it, or there is no gate.
+    fn is_low(&self) -> Option<bool> {
+        let report = &self.report;
+        let gate = self.gate.filter(|_| report.errors == 0)?;
+        let Some(estimate) = report.main() else {
+            // The bound without an event has 95 % confidence.
+            let bound = report.upper_bound_without_event.filter(|_| gate.confidence() <= 0.95)?;
+            return (bound <= gate.max()).then_some(true);
+        };
+        let (low, high) = (estimate.mean.lower_bound(gate.confidence())?, report.upper_bound(gate.confidence())?);
+        if high <= gate.max() { Some(true) } else { (low >= gate.max()).then_some(false) }
+    }
+
+    /// Returns the verdict; `None` without a gate.
+    fn word(&self) -> Option<&'static str> {
+        self.gate?;
+        Some(match self.is_low() {
+            _ if self.report.errors > 0 => "ERROR",
+            Some(true) if !self.report.not_judged.is_empty() => "NOT JUDGED",
+            Some(true) => "PASS",
+            Some(false) => "FAIL",
+            None => "INCONCLUSIVE",
+        })
+    }
+}
+
+/// Returns the results for programs.
+fn json_of(judged: &[Judged], seed: Option<u64>, remarks: &[String]) -> Value {
+    let reports: Vec<&RareReport> = judged.iter().map(|judged| &judged.report).collect();
+    let mut gates = judged.iter().filter_map(|judged| judged.gate);
+    let verdicts = gates.next().map(|first| {
+        // The gates of scenario files may differ.
+        let common = Some(first).filter(|first| gates.all(|gate| gate == *first));
+        let words: Vec<Option<&str>> = judged.iter().map(Judged::word).collect();
+        let (max, confidence) = (common.map(|gate| gate.max()), common.map(|gate| gate.confidence()));
+        json!({ "max_probability": max, "confidence": confidence, "verdicts": words })
+    });
+    stamped(json!({ "scenarios": reports, "gate": verdicts, "remarks": remarks }), seed, None)
+}
+
+fn print(judged: &[Judged], works: &[Arc<Work>], sensors: Option<SensorMode>) {
+    for (judged, work) in judged.iter().zip(works) {
+        let report = &judged.report;
+        print_text(report);
+        if let (Some(gate), Some(verdict)) = (judged.gate, judged.word()) {
+            let (max, confidence) = (gate.max(), percent(gate.confidence()));
+            if let Some(bound) = report.upper_bound(gate.confidence()).filter(|_| report.is_doubtful()) {
+                textln!(
+                    "  judged by an upper bound that holds for any weights, because the estimate is doubtful: {bound:.3e}"
+                );
             }
-            // No command line repeats a run of a controller from outside, of standard input, or of
-            // a member of an ensemble.
-            let is_named = work.file.path().is_file() || work.file.path() == library::path(&work.file.config().name);
-            let can_repeat = is_named && work.arms.iter().all(|arm| arm.controller.is_built_in());
-            for nearest in report.nearest.iter().filter(|_| can_repeat) {
-                let distance_sd = nearest.distance_sd;
-                let command = replay(work, nearest, sensors);
-                print_error(format_args!(
-                    "look: {command}  # {distance_sd:.2} standard deviations from the nominal case\n"
-                ));
-            }
+            textln!("  {verdict}: {max:.3e} allowed, {confidence} confidence");
+        }
+        // No command line repeats a run of a controller from outside, of standard input, or of a
+        // member of an ensemble.
+        let is_named = work.file.path().is_file() || work.file.path() == library::path(&work.file.config().name);
+        let can_repeat = is_named && work.arms.iter().all(|arm| arm.controller.is_built_in());
+        for nearest in report.nearest.iter().filter(|_| can_repeat) {
+            let distance_sd = nearest.distance_sd;
+            let command = replay(work, nearest, sensors);
+            print_error(format_args!(
+                "look: {command}  # {distance_sd:.2} standard deviations from the nominal case\n"
+            ));
         }
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_testing::has_python;
 
-use crate::support::{closecall, code, folder, json, json_file, message, stderr, stdout};
+use crate::support::{closecall, code, folder, json, json_file, message, program, stderr, stdout};
 
 /// The collision probability of the fixture, by construction.
 const TRUTH: f64 = 3.166_793e-5;
@@ -119,6 +119,34 @@ fn the_nearest_event_can_be_run_again() {
 fn a_gate_on_the_probability_is_judged_by_the_weighted_runs() {
     let verdict = |max: &str| code(&rare(&format!("--design importance --event collision --max-probability {max}")));
     assert_eq!([verdict("1e-4"), verdict("1e-6"), verdict("3.1e-5")], [0, 1, 4]);
+}
+
+#[test]
+fn the_gate_of_a_file_on_the_probability_is_judged_as_the_option_is() {
+    let place = folder();
+    let event = |event: &str, more: &str| {
+        let path = fixture();
+        let fixed = ["campaign", path.to_str().unwrap(), "--controller", "acc", "--design", "importance", "--event"];
+        let words = fixed.into_iter().chain([event]).chain(more.split_whitespace());
+        program().args(words).current_dir(place.path()).output().unwrap()
+    };
+    let project = |max: &str| {
+        let text = format!("[gate]\nmax-probability = {max}\nrequire = ['count(ego_collided) <= 0']\n");
+        fs::write(place.path().join("closecall.toml"), text).unwrap();
+    };
+    for (max, exit, word) in [("1e-4", 0, "PASS"), ("1e-6", 1, "FAIL"), ("3.1e-5", 4, "INCONCLUSIVE")] {
+        project(max);
+        let text = stdout(&event("collision", ""), exit);
+        assert!(text.contains(&format!("  {word}: ")), "{max}: {text}");
+        assert!(text.contains("not judged by --design importance: count(ego_collided) <= 0 ("), "{max}: {text}");
+    }
+    project("1e-6");
+    let weaker = stdout(&event("collision", "--max-probability 1e-4"), 4);
+    assert!(weaker.contains("NOT JUDGED") && weaker.contains("gate max-probability 0.000001, replaced by"), "{weaker}");
+    assert!(!stdout(&event("collision", "--no-gate"), 0).contains("allowed"), "a measurement");
+    // It bounds collisions, and no other event.
+    let other = stdout(&event("ego_is_struck", "--guide min_gap_rear_m"), 0);
+    assert!(other.contains("max-probability 0.000001 of a collision (") && !other.contains("FAIL"), "{other}");
 }
 
 #[test]
