@@ -213,7 +213,7 @@ impl Check for SensorsConfig {
         let additional_rear_lidars = self.check_additional([Some(rear_lidar), front_lidar], parameters)?;
         let camera = self.rear_camera.check(parameters).map_err(within("rear-camera"))?;
         let additional_cameras = check_further(
-            ("additional-rear-cameras", "at most three further cameras"),
+            ("additional-rear-cameras", "at most 3"),
             &self.additional_rear_cameras,
             vec![camera.name],
             |further| further.check_further(&camera, parameters),
@@ -281,7 +281,7 @@ impl SensorsConfig {
         {
             return Err(same_name::<Lidar>(rear).within("front-lidar"));
         }
-        let list = ("additional-rear-lidars", "at most three further LiDARs");
+        let list = ("additional-rear-lidars", "at most 3");
         check_further(list, &self.additional_rear_lidars, names, |lidar| lidar.check_named(None, parameters))
     }
 
@@ -663,7 +663,7 @@ mod tests {
         }
         assert!(error("rear-lidar.name = \"Left one\"").contains("`Left one` is no name"));
         let five = "{ name = \"a\" }, { name = \"b\" }, { name = \"c\" }, { name = \"d\" }";
-        assert!(error(&format!("additional-rear-lidars = [{five}]")).contains("at most three further LiDARs"));
+        assert!(error(&format!("additional-rear-lidars = [{five}]")).contains("has 4 entries, but at most 3 are allowed"));
         assert!(error("additional-rear-lidars = [{ name = \"a\", azimuth-deg = 90 }]").contains("[0].azimuth-deg"));
     }
 
@@ -694,8 +694,8 @@ mod tests {
             ("{ name = \"A b\" }", "`additional-rear-cameras[0].name`", "`A b` is no name"),
             (
                 "{ name = \"a\" }, { name = \"b\" }, { name = \"c\" }, { name = \"d\" }",
-                "`additional-rear-cameras` is 4",
-                "at most three further cameras",
+                "`additional-rear-cameras` has 4 entries",
+                "at most 3 are allowed",
             ),
             (
                 "{ name = \"a\", resolution.width-px = 0 }",

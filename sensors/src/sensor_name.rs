@@ -41,7 +41,7 @@ pub(crate) fn check_further<C, T: Named, const N: usize>(
     check: impl Fn(&C) -> Result<T, ConfigError>,
 ) -> Result<[Option<T>; N], ConfigError> {
     if configs.len() > N {
-        return Err(ConfigError::new(key, Problem::WrongCount { value: configs.len() as u64, allowed }));
+        return Err(ConfigError::new(key, Problem::WrongLength { value: configs.len() as u64, allowed }));
     }
     let mut checked = [None; N];
     for (index, (slot, config)) in checked.iter_mut().zip(configs).enumerate() {

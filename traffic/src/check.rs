@@ -72,6 +72,14 @@ pub enum Problem {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// A list has too few or too many entries.
+    #[error("has {value} {}, but {allowed} are allowed", if *value == 1 { "entry" } else { "entries" })]
+    WrongLength {
+        /// The number of entries.
+        value: u64,
+        /// The numbers of entries that are allowed.
+        allowed: &'static str,
+    },
     /// The road has no such lane.
     #[error("is {value}, but a lane of this road, from 1 (leftmost) to {lanes}, is needed")]
     UnknownLane {

@@ -696,7 +696,7 @@ mod tests {
         let alone = check_at(Some(2.75), 0.001, &[]).unwrap_err();
         assert!(alone.starts_with("`alignment-d-m` contradicts `alignment`"), "{alone}");
         let one = check(0.0, &points[..1]).unwrap_err();
-        assert!(one.starts_with("`alignment` is 1"), "{one}");
+        assert!(one.starts_with("`alignment` has 1 entry"), "{one}");
     }
 
     /// An arc beside the road is an arc at its left edge, whose radius is smaller or larger by the

@@ -150,8 +150,7 @@ impl Distribution {
     pub fn empirical(config: &EmpiricalConfig) -> Result<Self, ConfigError> {
         let quantiles = &config.quantiles;
         if quantiles.len() < 2 {
-            let problem =
-                Problem::WrongCount { value: quantiles.len() as u64, allowed: "a list of at least 2 numbers" };
+            let problem = Problem::WrongLength { value: quantiles.len() as u64, allowed: "at least 2" };
             return Err(ConfigError::new("quantiles", problem));
         }
         for (index, &value) in quantiles.iter().enumerate() {

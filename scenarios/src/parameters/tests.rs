@@ -168,7 +168,7 @@ fn an_error_states_the_key_the_value_and_what_is_allowed() {
             "log-normal = { median = -1, sigma = 1 }",
             "`x.log-normal.median` is -1, but a number above 0 and up to 1000000000000 is needed",
         ),
-        ("empirical = { quantiles = [1] }", "`x.empirical.quantiles` is 1, but a list of at least 2 numbers is needed"),
+        ("empirical = { quantiles = [1] }", "`x.empirical.quantiles` has 1 entry, but at least 2 are allowed"),
         (
             "empirical = { quantiles = [1, 3, 2] }",
             "`x.empirical.quantiles[2]` is 2, but a number from 3 to 1000000000000 is needed",

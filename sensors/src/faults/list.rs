@@ -41,7 +41,7 @@ impl<T: Combine> FaultList<T> {
         check: impl Fn(&C) -> Result<(T, [f64; 2]), ConfigError>,
     ) -> Result<Self, ConfigError> {
         if configs.len() > MAX_ENTRIES {
-            let problem = Problem::WrongCount { value: configs.len() as u64, allowed: "at most four entries" };
+            let problem = Problem::WrongLength { value: configs.len() as u64, allowed: "at most 4" };
             return Err(ConfigError::new(key, problem));
         }
         let mut list = Self::default();

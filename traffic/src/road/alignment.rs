@@ -206,8 +206,7 @@ impl Alignment {
     /// in order: they increase by 1 m or more, or a position occurs twice.
     pub fn new(points: &[AlignmentPoint]) -> Result<Self, ConfigError> {
         if !(2..=Self::MAX_POINTS).contains(&points.len()) {
-            let problem =
-                Problem::WrongCount { value: points.len() as u64, allowed: "a number of points from 2 to 32" };
+            let problem = Problem::WrongLength { value: points.len() as u64, allowed: "2 to 32" };
             return Err(ConfigError::new("alignment", problem));
         }
         for (index, point) in points.iter().enumerate() {

@@ -50,7 +50,7 @@ fn a_pattern_has_up_to_128_layers() {
         config.layers_deg = (0..129).map(|layer| 0.1 * f64::from(layer)).collect();
     };
     let error = checked(too_many).unwrap_err();
-    assert_eq!(error, "`layers-deg` is 129, but a list of 1 to 128 elevations is needed");
+    assert_eq!(error, "`layers-deg` has 129 entries, but 1 to 128 are allowed");
 }
 
 #[test]
