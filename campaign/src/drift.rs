@@ -95,7 +95,7 @@ impl Fitted {
     /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let text = source::text(path)?;
-        Self::parse(&text).map_err(|message| ScenarioError::Syntax { path: path.to_owned(), line: 1, message })
+        Self::parse(&text).map_err(|message| ScenarioError::Syntax { path: path.to_owned(), line: Some(1), message })
     }
 
     fn parse(text: &str) -> Result<Self, String> {

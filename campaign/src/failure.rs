@@ -28,6 +28,7 @@ pub enum FailureKind {
 impl From<&ScenarioError> for FailureKind {
     fn from(error: &ScenarioError) -> Self {
         match error {
+            ScenarioError::Set { .. } if !error.is_setting() => Self::InvalidInput,
             ScenarioError::Set { .. } | ScenarioError::Unknown { .. } => Self::Usage,
             ScenarioError::Read { .. } if error.is_io() => Self::Io,
             ScenarioError::Read { .. }

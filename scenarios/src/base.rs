@@ -6,12 +6,11 @@
 //! a parameter that no value uses. The result is one text, on which all later steps work, and a
 //! campaign's folder keeps the whole scenario.
 
-use std::path::Path;
-
+use closecall_traffic::{KeyPath, Segment};
 use toml_edit::{DocumentMut, Item, TableLike};
 
 use super::file::used_parameters;
-use super::{ScenarioError, library};
+use super::{library, locate};
 
 /// The key of the table of parameters.
 const PARAMETERS: &str = "parameters";
@@ -24,24 +23,24 @@ const JUDGED_BY: [&str; 3] = ["requirements", "checks", "gate"];
 /// Returns the text of the whole scenario, or `None` if the text names no base.
 ///
 /// # Errors
-/// Returns a message if the library does not have the base.
-pub(super) fn expand(text: &str) -> Result<Option<String>, String> {
+/// Returns a line and a message if the library does not have the base.
+pub(super) fn expand(text: &str) -> Result<Option<String>, (usize, String)> {
     // Most files have no base, and the reader reports a file that is not TOML.
     if !text.contains(BASE) {
         return Ok(None);
     }
-    let Ok(mut document) = text.parse::<DocumentMut>() else { return Ok(None) };
+    let own = text;
+    let Ok(mut document) = own.parse::<DocumentMut>() else { return Ok(None) };
     let Some(base) = document.remove(BASE) else { return Ok(None) };
     let name = base.as_str().unwrap_or_default();
     let Some(text) = library::plain_text(name) else {
         let names: Vec<&str> = library::plain_names().collect();
-        return Err(format!(
-            "`{BASE}` is {}, but one of the library is needed: {}",
-            base.to_string().trim(),
-            names.join(", ")
-        ));
+        let key = KeyPath(vec![Segment::Key(BASE.to_owned())]);
+        let value = base.to_string();
+        let message = format!("`{BASE}` is {}, but one of the library is needed: {}", value.trim(), names.join(", "));
+        return Err((locate::line_of(own, &key).unwrap_or(1), message));
     };
-    let mut whole = text.parse::<DocumentMut>().map_err(|error| error.to_string())?;
+    let mut whole = text.parse::<DocumentMut>().map_err(|error| (1, error.to_string()))?;
     for key in JUDGED_BY {
         whole.remove(key);
     }
@@ -62,29 +61,6 @@ fn remove_unused(whole: &mut DocumentMut, file: &DocumentMut) {
     for name in names.iter().filter(|name| !used.contains(&name.as_str()) && !is_own(name)) {
         parameters.remove(name);
     }
-}
-
-/// Turns an error in the whole text into an error in the text that names the base. An error in
-/// another file, such as a pattern of a LiDAR, stays as it is.
-pub(super) fn located(error: ScenarioError, own: &Path, whole: &str, text: &str) -> ScenarioError {
-    let line_of = |line: usize| own_line(line, whole, text);
-    match error {
-        ScenarioError::Syntax { path, line, message } if path == own => {
-            ScenarioError::Syntax { path, line: line_of(line), message }
-        }
-        ScenarioError::Value { path, line, source, at } if path == own => {
-            ScenarioError::Value { path, line: line.map(line_of), source, at }
-        }
-        other => other,
-    }
-}
-
-/// Turns a line of the whole text into a line of the text that names the base: the line with the
-/// same words or, if only the base has these words, the line of the key `base`.
-pub(super) fn own_line(line: usize, whole: &str, text: &str) -> usize {
-    let words = whole.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
-    let own = text.lines().position(|line| line.trim() == words).filter(|_| !words.is_empty());
-    own.or_else(|| text.lines().position(|line| line.trim_start().starts_with(BASE))).unwrap_or(0) + 1
 }
 
 /// Replaces the values of `target` by the values of `source`, and merges tables.
@@ -145,16 +121,19 @@ mod tests {
         };
         assert_eq!(line("\n[sensors.rear-camera]\nyaw-deg = 90\n"), Some(5), "a value out of range");
         assert_eq!(line("[parameters]\nx = { uniform = { min = 0, max = 1 } }\n"), Some(4), "an unused parameter");
-        assert_eq!(
-            line("parameters.cruise-mps = { uniform = { min = -90, max = -80 } }\n"),
-            Some(1),
-            "words of the base only"
-        );
+        assert_eq!(line("parameters.cruise-mps.uniform = { min = -90, max = -80 }\n"), None, "a value of the base");
+        // The same words stand elsewhere in the file, and the first of them is right.
+        let twice = "[sensors.rear-camera]\nyaw-deg = 20\n[[fault.rear-object]]\nyaw-deg = 20\n";
+        assert_eq!(line(twice), Some(6), "the second of two");
+        let words = twice.replace("object]]\nyaw-deg = 20", "object]]\nyaw-deg = 'x'");
+        let syntax = parse(&format!("base = \"low-thw-overtake\"\nname = \"own\"\n{words}")).unwrap_err();
+        assert!(syntax.contains("own.toml:6: `yaw-deg`"), "{syntax}");
     }
 
     #[test]
     fn a_base_that_the_library_does_not_have_is_refused() {
-        let error = parse("base = \"low-thw\"\nname = \"own\"\n").unwrap_err();
+        let error = parse("# mine\nbase = \"low-thw\"\nname = \"own\"\n").unwrap_err();
+        assert!(error.contains("own.toml:2: "), "{error}");
         assert!(error.contains("`base` is \"low-thw\"") && error.contains("low-thw-overtake"), "{error}");
     }
 }

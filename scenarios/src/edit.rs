@@ -7,13 +7,14 @@ use std::fmt;
 use std::str::FromStr;
 
 use closecall_traffic::suggest::hint;
-use toml_edit::{ArrayOfTables, DocumentMut, Formatted, InlineTable, Item, TableLike, Value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Formatted, InlineTable, Item, TableLike, Value};
 
 /// One `key=value` from the command line.
 ///
-/// The key is a path of keys joined by dots. An actor is identified by its id or by its index, from
-/// 0 (`actor.rear.…`, `actor.2.…`). A key without a dot that is the name of a parameter fixes that
-/// parameter: `brake-mps2=6`.
+/// The key is a path of keys joined by dots. An element of a list is identified by its index, from
+/// 0, or by its `id` or `name` (`actor.2.…`, `actor[2].…`, `actor.rear.…`). A key without a dot that
+/// is the name of a parameter fixes that parameter: `brake-mps2=6`. The value replaces a whole list,
+/// a whole element of a list, or a single value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     key: Vec<String>,
@@ -35,6 +36,16 @@ pub enum SettingError {
         /// The text found.
         text: String,
     },
+    /// The value begins like a list, a table or a quoted text, and is none.
+    #[error(
+        "the value of `{key}` is no TOML: {message}: lists are written [1, 2], tables {{key = 1}}, texts in quotes"
+    )]
+    NotToml {
+        /// The key.
+        key: String,
+        /// What is wrong.
+        message: String,
+    },
     /// The value is NaN or infinite.
     #[error("`{key}={value}`: a finite number is needed")]
     NotFinite {
@@ -52,6 +63,24 @@ pub enum SettingError {
         part: String,
         /// The keys that exist there.
         names: String,
+    },
+    /// A list has no such element.
+    #[error("`{key}` leads nowhere: there is no {part}: {allowed}{}", hint(part.trim_matches('`'), allowed))]
+    NoSuchElement {
+        /// The whole key.
+        key: String,
+        /// The part that was not found.
+        part: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// The scenario cannot have the value.
+    #[error("`{setting}`: {message}")]
+    Value {
+        /// The setting.
+        setting: String,
+        /// What is wrong and what is allowed.
+        message: String,
     },
     /// Two settings name the same element of a list, by its id and by its index, and contradict
     /// each other.
@@ -75,14 +104,30 @@ impl FromStr for Setting {
 
     fn from_str(text: &str) -> Result<Self, SettingError> {
         let form = || SettingError::Form { text: text.to_owned() };
-        let (key, value) = text.split_once('=').ok_or_else(form)?;
-        let key: Vec<String> = key.trim().split('.').map(|part| part.trim().to_owned()).collect();
+        let (path, value) = text.split_once('=').ok_or_else(form)?;
+        let mut key = Vec::new();
+        for part in path.split('.') {
+            // `list[0]` is the same as `list.0`.
+            let (name, indices) = part.trim().split_once('[').unwrap_or((part.trim(), "]"));
+            let indices = indices.strip_suffix(']').ok_or_else(form)?;
+            key.push(name.trim().to_owned());
+            if part.contains('[') {
+                key.extend(indices.split("][").map(|index| index.trim().to_owned()));
+            }
+        }
         let value = value.trim().to_owned();
-        if key.iter().any(String::is_empty) || value.is_empty() {
+        if key.iter().any(|part| part.is_empty() || part.contains(['[', ']'])) || value.is_empty() {
             return Err(form());
         }
+        let key_text = || key.join(".");
         if value.parse().is_ok_and(|number: f64| !number.is_finite()) {
-            return Err(SettingError::NotFinite { key: key.join("."), value });
+            return Err(SettingError::NotFinite { key: key_text(), value });
+        }
+        if value.starts_with(['[', '{', '"', '\''])
+            && let Err(error) = Value::from_str(&value)
+        {
+            let message = error.message().lines().collect::<Vec<_>>().join(", ");
+            return Err(SettingError::NotToml { key: key_text(), message });
         }
         Ok(Self { key, value })
     }
@@ -98,41 +143,38 @@ impl Setting {
         })
     }
 
-    /// Checks that no two settings contradict each other in this document alone, in which an id and
-    /// an index name the same element of a list (`actor.rear.…`, `actor.2.…`). Settings that
-    /// contradict each other in any document are the caller's: see [`Self::contradiction`].
+    /// Sets the values in `document`, one after the other.
     ///
     /// # Errors
-    /// [`SettingError::Contradiction`] with the first two settings.
-    pub(super) fn check_together(settings: &[Self], document: &DocumentMut) -> Result<(), SettingError> {
-        let by_index: Vec<Self> = settings.iter().map(|setting| setting.by_index(document)).collect();
+    /// [`SettingError`] for the first setting that cannot be applied, and for two that contradict
+    /// each other in this document alone, in which an id and an index name the same element of a
+    /// list (`actor.rear.…`, `actor.2.…`). Settings that contradict each other in any document are
+    /// the caller's: see [`Self::contradiction`].
+    pub(super) fn apply_all(settings: &[Self], document: &mut DocumentMut) -> Result<(), SettingError> {
+        let mut by_index: Vec<Self> = Vec::new();
         for (index, later) in settings.iter().enumerate() {
-            for (earlier, same) in settings[..index].iter().zip(&by_index) {
-                if by_index[index].undoes(same) && !later.undoes(earlier) {
+            let same = later.by_index(document);
+            for (earlier, earlier_by_index) in settings[..index].iter().zip(&by_index) {
+                if same.undoes(earlier_by_index) && !later.undoes(earlier) {
                     return Err(SettingError::Contradiction { first: earlier.to_string(), second: later.to_string() });
                 }
             }
+            by_index.push(same);
+            later.apply(document)?;
         }
         Ok(())
     }
 
     /// Returns the setting with the index of each element of a list that it names by its id.
-    fn by_index(&self, document: &DocumentMut) -> Self {
+    fn by_index(&self, document: &mut DocumentMut) -> Self {
         let mut key = self.key.clone();
-        let mut table: Option<&dyn TableLike> = Some(document.as_table());
-        let mut parts = key.iter_mut();
-        while let (Some(parent), Some(part)) = (table, parts.next()) {
-            table = match parent.get(part.as_str()) {
-                Some(Item::ArrayOfTables(elements)) => {
-                    let Some(name) = parts.next() else { break };
-                    let index = index_of(elements, name);
-                    if let Some(index) = index {
-                        *name = index.to_string();
-                    }
-                    index.and_then(|index| elements.get(index)).map(|element| element as &dyn TableLike)
-                }
-                item => item.and_then(Item::as_table_like),
-            };
+        let mut node = Some(Node::Table(document.as_table_mut()));
+        for part in &mut key {
+            let Some(current) = node else { break };
+            if let Some(index) = current.index_of(part) {
+                *part = index.to_string();
+            }
+            node = current.child(part);
         }
         Self { key, value: self.value.clone() }
     }
@@ -200,52 +242,74 @@ impl Setting {
             ));
         }
         let Some((last, parents)) = self.key.split_last() else { return Ok(()) };
-        let mut table: &mut dyn TableLike = document.as_table_mut();
-        let mut parents = parents.iter();
-        while let Some(part) = parents.next() {
+        let mut node = Node::Table(document.as_table_mut());
+        for (depth, part) in parents.iter().enumerate() {
             // Below the first level, a table that the file leaves out is created. Its content is
-            // checked like the rest.
-            let is_optional = *part != self.key[0] || OPTIONAL_TABLES.contains(&part.as_str());
-            if !table.contains_key(part) && is_optional {
+            // checked like the rest. A number would be an element of a list.
+            let is_optional = depth > 0 || OPTIONAL_TABLES.contains(&part.as_str());
+            if let Node::Table(table) = &mut node
+                && is_optional
+                && !table.contains_key(part)
+            {
+                if self.key[depth + 1].parse::<usize>().is_ok() {
+                    let list = self.key[..=depth].join(".");
+                    let allowed = format!("the file leaves this list out, and `{list}=[…]` gives it whole");
+                    return Err(self.no_such_element(&format!("list `{part}`"), allowed));
+                }
                 table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
             }
-            let names = keys(table);
-            let item = table.get_mut(part).ok_or_else(|| self.no_such_key(&format!("`{part}`"), names))?;
-            table = match item {
-                Item::ArrayOfTables(tables) => self.element(part, tables, parents.next())?,
-                item => item
-                    .as_table_like_mut()
-                    .ok_or_else(|| self.no_such_key(&format!("table `{part}`"), "a value".to_owned()))?,
-            };
+            let missing = self.missing(&node, (depth > 0).then(|| parents[depth - 1].as_str()), part);
+            node = node.child(part).ok_or(missing)?;
         }
-        if table.get(last).is_some_and(Item::is_array_of_tables) {
-            return Err(self.no_such_key(&format!("single `{last}`"), "a list of them".to_owned()));
+        let missing = self.missing(&node, parents.last().map(String::as_str), last);
+        let index = node.index_of(last);
+        match (node, index) {
+            (Node::Table(table), _) => {
+                table.insert(last, Item::Value(value));
+            }
+            (Node::Tables(tables), Some(index)) => match (tables.get_mut(index), value) {
+                (Some(element), Value::InlineTable(table)) => *element = table.into_table(),
+                _ => {
+                    return Err(self.no_such_element(
+                        &format!("value `{last}`"),
+                        "an element of this list is a table {…}".to_owned(),
+                    ));
+                }
+            },
+            (Node::Array(array), Some(index)) => {
+                array.replace(index, value);
+            }
+            (Node::Tables(_) | Node::Array(_) | Node::Value, _) => return Err(missing),
         }
-        table.insert(last, Item::Value(value));
         Ok(())
     }
 
-    /// Returns the element of an array of tables that the next part of the key identifies, by its
-    /// id or by its index.
-    fn element<'a>(
-        &self,
-        array: &str,
-        tables: &'a mut ArrayOfTables,
-        name: Option<&String>,
-    ) -> Result<&'a mut dyn TableLike, SettingError> {
-        let ids: Vec<String> =
-            tables.iter().map(|table| table.get("id").and_then(Item::as_str).unwrap_or_default().to_owned()).collect();
-        let not_found = || {
-            let part = name.map_or_else(|| format!("single `{array}`"), |name| format!("`{name}`"));
-            let ids: Vec<String> = ids.iter().map(|id| format!("`{id}`")).collect();
-            self.no_such_key(&part, format!("`{array}` with a name and a key: {}", ids.join(", ")))
-        };
-        let name = name.ok_or_else(not_found)?;
-        let index = index_of(tables, name).ok_or_else(not_found)?;
-        match tables.get_mut(index) {
-            Some(table) => Ok(table),
-            None => Err(not_found()),
+    /// Returns the error for a part of the key that leads nowhere. `parent` is the part before it.
+    fn missing(&self, node: &Node<'_>, parent: Option<&str>, part: &str) -> SettingError {
+        let parent = parent.unwrap_or_default();
+        match node {
+            Node::Table(table) if table.contains_key(part) => {
+                self.no_such_key(&format!("table `{part}`"), "a value".to_owned())
+            }
+            Node::Table(table) => self.no_such_key(&format!("`{part}`"), keys(&**table)),
+            Node::Value => self.no_such_key(&format!("table `{parent}`"), "a value".to_owned()),
+            Node::Tables(_) | Node::Array(_) => {
+                let ids: Vec<String> = node.ids().into_iter().flatten().map(|id| format!("`{id}`")).collect();
+                let allowed = match (node.ids().len(), ids.is_empty()) {
+                    (0, _) => format!("the list `{parent}` is empty"),
+                    (1, true) => format!("the list `{parent}` has the element 0 only"),
+                    (count, true) => format!("the list `{parent}` has the elements 0 to {}", count - 1),
+                    (count, false) => {
+                        format!("the list `{parent}` has the elements 0 to {}, named {}", count - 1, ids.join(", "))
+                    }
+                };
+                self.no_such_element(&format!("`{part}`"), allowed)
+            }
         }
+    }
+
+    fn no_such_element(&self, part: &str, allowed: String) -> SettingError {
+        SettingError::NoSuchElement { key: self.key.join("."), part: part.to_owned(), allowed }
     }
 
     fn no_such_key(&self, part: &str, names: String) -> SettingError {
@@ -258,10 +322,68 @@ impl Setting {
     }
 }
 
-/// Returns the index of the element that a part of a key names, by its id or by its index.
-fn index_of(elements: &ArrayOfTables, name: &str) -> Option<usize> {
-    let mut ids = elements.iter().map(|element| element.get("id").and_then(Item::as_str));
-    ids.position(|id| id == Some(name)).or_else(|| name.parse().ok())
+/// A part of a document that a part of a key may lead into.
+enum Node<'a> {
+    /// A table in either of the two forms of TOML.
+    Table(&'a mut dyn TableLike),
+    /// A list of tables, written `[[…]]`.
+    Tables(&'a mut ArrayOfTables),
+    /// A list, written `[…]`.
+    Array(&'a mut Array),
+    /// A value that nothing is below.
+    Value,
+}
+
+impl<'a> Node<'a> {
+    fn of_value(value: &'a mut Value) -> Self {
+        match value {
+            Value::InlineTable(table) => Self::Table(table),
+            Value::Array(array) => Self::Array(array),
+            _ => Self::Value,
+        }
+    }
+
+    fn of_item(item: &'a mut Item) -> Self {
+        match item {
+            Item::Table(table) => Self::Table(table),
+            Item::ArrayOfTables(tables) => Self::Tables(tables),
+            Item::Value(value) => Self::of_value(value),
+            Item::None => Self::Value,
+        }
+    }
+
+    /// Returns what a part of a key names, if there is such a key or element.
+    fn child(self, part: &str) -> Option<Self> {
+        let index = self.index_of(part);
+        match self {
+            Self::Table(table) => table.get_mut(part).map(Self::of_item),
+            Self::Tables(tables) => tables.get_mut(index?).map(|table| Self::Table(table)),
+            Self::Array(array) => array.get_mut(index?).map(Self::of_value),
+            Self::Value => None,
+        }
+    }
+
+    /// Returns the index of the element of a list that a part of a key names, by its `id`, its
+    /// `name` or its index. Returns `None` if this is no list, or has no such element.
+    fn index_of(&self, part: &str) -> Option<usize> {
+        let ids = self.ids();
+        let index = || part.parse::<usize>().ok().filter(|index| *index < ids.len());
+        ids.iter().position(|id| *id == Some(part)).or_else(index)
+    }
+
+    /// Returns the `id` or `name` of each element of a list; nothing if this is no list.
+    fn ids(&self) -> Vec<Option<&str>> {
+        fn id(table: &dyn TableLike) -> Option<&str> {
+            table.get("id").or_else(|| table.get("name")).and_then(Item::as_str)
+        }
+        match self {
+            Self::Tables(tables) => tables.iter().map(|table| id(table)).collect(),
+            Self::Array(array) => {
+                array.iter().map(|value| value.as_inline_table().and_then(|table| id(table))).collect()
+            }
+            Self::Table(_) | Self::Value => Vec::new(),
+        }
+    }
 }
 
 /// Returns true if both values mean the same: numbers are compared as numbers (`6` and `6.0`).
@@ -347,7 +469,7 @@ mod tests {
         let text = format!("{TEXT}[[actor]]\nid = 'front'\nstart = {{ behind = {{ gap-m = 60 }} }}\n");
         let document: DocumentMut = text.parse().unwrap();
         let checked = |texts: [&str; 2]| {
-            Setting::check_together(&texts.map(|text| text.parse::<Setting>().unwrap()), &document)
+            Setting::apply_all(&texts.map(|text| text.parse::<Setting>().unwrap()), &mut document.clone())
                 .map_err(|error| error.to_string())
         };
         for texts in [
@@ -363,11 +485,56 @@ mod tests {
             ["actor.rear.start.behind.gap-m=90", "actor.1.start.behind.gap-m=120"],
             ["actor.rear.start.behind.gap-m=90", "actor.0.start.behind.gap-m=90.0"],
             ["actor.rear.start={behind={gap-m=120}}", "actor.0.start.behind.gap-m=90"],
-            ["actor.7.start.behind.gap-m=90", "actor.nobody.start.behind.gap-m=120"],
             // What the caller finds without the document.
             ["actor.rear.start.behind.gap-m=90", "actor.rear.start.behind.gap-m=120"],
         ] {
             assert_eq!(checked(texts), Ok(()), "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn a_list_is_replaced_and_its_elements_are_set_in_both_spellings() {
+        const LISTS: &str = "tags = ['a', 'b']\n[sensors]\ncameras = [{ name = 'wide', yaw-deg = 3 }, { name = 'low' }]\n\
+                             [[actor]]\nid = 'ego'\n[[actor]]\nid = 'rear'\n[[actor.event]]\nid = 'brakes'\n";
+        let set = |text: &str| -> Result<toml::Table, String> {
+            let mut document: DocumentMut = LISTS.parse().unwrap();
+            let setting: Setting = text.parse().map_err(|error: SettingError| error.to_string())?;
+            Setting::apply_all(&[setting], &mut document).map_err(|error| error.to_string())?;
+            Ok(document.to_string().parse().unwrap())
+        };
+        let is = |setting: &str, [from, to]: [&str; 2]| {
+            let expected: toml::Table = LISTS.replacen(from, to, 1).parse().unwrap();
+            assert_eq!(set(setting), Ok(expected), "{setting}");
+        };
+        for key in ["sensors.cameras.0.yaw-deg", "sensors.cameras[0].yaw-deg", "sensors.cameras.wide.yaw-deg"] {
+            is(&format!("{key}=4"), ["yaw-deg = 3", "yaw-deg = 4"]);
+        }
+        is("sensors.cameras[1]={name='far'}", ["'low'", "'far'"]);
+        is("sensors.cameras=[{name='far'}]", ["{ name = 'wide', yaw-deg = 3 }, { name = 'low' }", "{ name = 'far' }"]);
+        is("sensors.cameras=[]", ["[{ name = 'wide', yaw-deg = 3 }, { name = 'low' }]", "[]"]);
+        is("tags[1]=c", ["'b'", "'c'"]);
+        is("actor.rear.event[0].id=x", ["'brakes'", "'x'"]);
+        is("actor[0]={id='me'}", ["'ego'", "'me'"]);
+        is("actor[1].event=[{id='x'},{id='y'}]", ["id = 'brakes'", "id = 'x'\n[[actor.event]]\nid = 'y'"]);
+        assert_eq!("a[0] . b [1]=2".parse::<Setting>().unwrap().to_string(), "a.0.b.1=2");
+        assert_eq!("a[0].b[1][2]=2".parse::<Setting>().unwrap().to_string(), "a.0.b.1.2=2");
+        for (setting, said) in [
+            (
+                "actor.2.id=x",
+                "`actor.2.id` leads nowhere: there is no `2`: the list `actor` has the elements 0 to 1, named `ego`, `rear`",
+            ),
+            ("actor[-1].id=x", "there is no `-1`: the list `actor` has the elements 0 to 1"),
+            ("actor.raer.id=x", "did you mean `rear`?"),
+            ("tags.2=c", "there is no `2`: the list `tags` has the elements 0 to 1"),
+            ("tags.0.x=c", "there is no table `0`, only a value"),
+            ("actor.0=3", "an element of this list is a table {…}"),
+            ("sensors.lidars.0.name=x", "`sensors.lidars=[…]` gives it whole"),
+            ("actor[0=3", "is not of the form key=value"),
+            ("actor[]=3", "is not of the form key=value"),
+            ("actor=[{id=me}]", "the value of `actor` is no TOML: "),
+        ] {
+            let message = set(setting).unwrap_err();
+            assert!(message.contains(said), "{setting}: {message}");
         }
     }
 
@@ -383,7 +550,7 @@ mod tests {
 
     #[test]
     fn an_invalid_setting_or_unknown_key_is_rejected() {
-        let unknown = ["actor.front.id=1", "actor.7.id=1", "actor=3", "road.lanes=2", "duration-s.x=1", "brake=3"];
+        let unknown = ["actor.front.id=1", "actor.7.id=1", "actor.rear=3", "road.lanes=2", "duration-s.x=1", "brake=3"];
         for text in ["nonsense", "=1", "a=", "duration-s=nan", "duration-s=-inf"].into_iter().chain(unknown) {
             assert!(set(text).is_err(), "{text}");
         }

@@ -73,12 +73,12 @@ pub enum ScenarioError {
         path: PathBuf,
     },
     /// The file is not valid TOML, or has an unknown key or a value of the wrong type.
-    #[error("failed to read {}:{line}: {message}", path.display())]
+    #[error("failed to read {}{}: {message}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Syntax {
         /// The file.
         path: PathBuf,
-        /// The line, counted from 1.
-        line: usize,
+        /// The line, counted from 1, or `None` if the file does not contain the key.
+        line: Option<usize>,
         /// What is wrong and what is allowed.
         message: String,
     },
@@ -121,16 +121,16 @@ impl ScenarioError {
         matches!(self, Self::Read { source, .. } if !input::is_of_content(source))
     }
 
-    /// Returns whether a setting is wrong, and not the file.
+    /// Returns whether a setting names what does not exist, or contradicts another one.
     pub const fn is_setting(&self) -> bool {
-        matches!(self, Self::Set { .. })
+        matches!(self, Self::Set { source, .. } if !matches!(source, SettingError::Value { .. }))
     }
 
     /// Returns the line of the error, counted from 1, or `None` if it has none.
     pub const fn line(&self) -> Option<usize> {
         match self {
-            Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
-            Self::Value { line, .. } | Self::UnusedParameter { line, .. } => *line,
+            Self::NotText { line, .. } => Some(*line),
+            Self::Syntax { line, .. } | Self::Value { line, .. } | Self::UnusedParameter { line, .. } => *line,
             Self::Read { .. }
             | Self::TooLarge { .. }
             | Self::Empty { .. }
@@ -145,8 +145,8 @@ impl ScenarioError {
 pub struct ScenarioFile {
     path: PathBuf,
     text: String,
-    /// The text that names a base, if the text above comes from one.
-    own_text: Option<String>,
+    /// Where the lines of keys are found.
+    origin: locate::Origin,
     config: ScenarioConfig,
     space: ParameterSpace,
     coverage: CoveragePlan,
@@ -189,43 +189,42 @@ impl ScenarioFile {
                 "it is XML, and a scenario is a TOML file: `closecall tool import {} -o scenario.toml` imports OpenSCENARIO",
                 path.display()
             );
-            return Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message });
+            return Err(ScenarioError::Syntax { path: path.to_owned(), line: Some(1), message });
         }
         match base::expand(text) {
-            Ok(None) => Self::parse_whole(path, text, settings),
-            Ok(Some(whole)) => {
-                let parsed = Self::parse_whole(path, &whole, settings);
-                let file = parsed.map_err(|error| base::located(error, path, &whole, text))?;
-                Ok(Self { own_text: Some(text.to_owned()), ..file })
-            }
-            Err(message) => Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message }),
+            Ok(None) => Self::parse_whole(path, text, text, settings),
+            Ok(Some(whole)) => Self::parse_whole(path, text, &whole, settings),
+            Err((line, message)) => Err(ScenarioError::Syntax { path: path.to_owned(), line: Some(line), message }),
         }
     }
 
-    /// Parses the text of a scenario that has no base.
-    fn parse_whole(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
-        // The text is read once. With settings the unchanged text comes first, so that errors in
-        // the file have the line numbers of the file.
-        let mut config = deserialize(path, text)?;
+    /// Parses the text of a scenario that has no base. `own` is the text of the file, in which
+    /// lines are counted.
+    fn parse_whole(path: &Path, own: &str, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
+        // The text is read once. With settings the unchanged text comes first, so that an error of
+        // the file is none of a setting.
+        let mut origin = locate::Origin::new(own, text);
+        let mut config = deserialize(path, text, &origin)?;
+        let value_error = |source: ConfigError, origin: &locate::Origin| {
+            let line = origin.line_of(&source.path);
+            ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
+        };
         let parameters = config.parameters.0.len() as u64;
         if parameters > MOST_PARAMETERS {
             let problem = Problem::WrongCount { value: parameters, allowed: "a number of parameters from 0 to 1000" };
-            let source = ConfigError::new("parameters", problem);
-            let line = locate::line_of(text, &source.path);
-            return Err(ScenarioError::Value {
-                path: path.to_owned(),
-                line,
-                source: Box::new(source),
-                at: String::new(),
-            });
+            return Err(value_error(ConfigError::new("parameters", problem), &origin));
         }
         // A setting may replace the only use of a parameter. Only a parameter that the file itself
         // does not use is a mistake.
         let unused = unused_parameter(&config, text);
         let mut text = text.to_owned();
         if !settings.is_empty() {
-            text = apply(path, &text, settings)?;
-            let before = std::mem::replace(&mut config, deserialize(path, &text)?);
+            let before_settings = text;
+            text = apply(path, &before_settings, settings)?;
+            origin = locate::Origin::new(own, &text);
+            let after: ScenarioConfig =
+                toml::from_str(&text).map_err(|_| wrong_setting(path, &before_settings, settings))?;
+            let before = std::mem::replace(&mut config, after);
             let weakened = overridden::weakened(&before, &config);
             if weakened != config.overridden {
                 text = with_overridden(&text, &weakened);
@@ -233,30 +232,22 @@ impl ScenarioFile {
             }
         }
         let trajectory_files = recorded::files(path, &config);
-        if let Some(inlined) =
-            recorded::inline(path, &text, &mut config).map_err(|error| recorded_error(path, &text, &error))?
+        if let Some(inlined) = recorded::inline(path, &text, &mut config)
+            .map_err(|error| recorded_error(path, &config, &origin, &error))?
         {
             text = inlined;
         }
-        if let Some(inlined) = lidar_file::inline(path, &text, &mut config)? {
+        if let Some(inlined) = lidar_file::inline(path, &text, &origin, &mut config)? {
             text = inlined;
         }
-        let space = config.parameters.check().map_err(|error| {
-            let source = error.within("parameters");
-            let line = locate::line_of(&text, &source.path);
-            ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
-        })?;
+        let space = config.parameters.check().map_err(|error| value_error(error.within("parameters"), &origin))?;
         let coverage = config.coverage.check(&space).and_then(|plan| config.check_coverage_gates(&plan).map(|()| plan));
-        let coverage = coverage.map_err(|error| {
-            let source = error.within("coverage");
-            let line = locate::line_of(&text, &source.path);
-            ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
-        })?;
+        let coverage = coverage.map_err(|error| value_error(error.within("coverage"), &origin))?;
         let strata = coverage.strata(&space);
         Ok(Self {
             path: path.to_owned(),
             text,
-            own_text: None,
+            origin,
             config,
             space: space.with_strata(strata),
             coverage,
@@ -273,8 +264,8 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError`] if the text is not a scenario, or if a distribution is invalid.
     pub(super) fn with_text(&self, text: &str) -> Result<Self, ScenarioError> {
-        let Self { trajectory_files, settings, unused, program_folder, .. } = self.clone();
-        Ok(Self { trajectory_files, settings, unused, program_folder, ..Self::parse(&self.path, text, &[])? })
+        let Self { origin, trajectory_files, settings, unused, program_folder, .. } = self.clone();
+        Ok(Self { origin, trajectory_files, settings, unused, program_folder, ..Self::parse(&self.path, text, &[])? })
     }
 
     /// Returns the same file, whose perception program runs in this folder. If the name of the
@@ -382,7 +373,7 @@ impl ScenarioFile {
         }
         let Some(name) = self.unused.clone() else { return Ok(self) };
         let key = KeyPath(["parameters", name.as_str()].map(|key| Segment::Key(key.to_owned())).into());
-        let line = self.line_of(&key);
+        let line = self.origin.line_of(&key);
         Err(ScenarioError::UnusedParameter { path: self.path, line, name })
     }
 
@@ -438,14 +429,8 @@ impl ScenarioFile {
 
     /// Returns an error with its place in the file. `at` says when it holds.
     pub(super) fn located(&self, source: ConfigError, at: String) -> ScenarioError {
-        let line = self.line_of(&source.path);
+        let line = self.origin.line_of(&source.path);
         ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at }
-    }
-
-    /// Returns the line of a key in the file, counted from 1.
-    fn line_of(&self, path: &KeyPath) -> Option<usize> {
-        let line = locate::line_of(&self.text, path)?;
-        Some(self.own_text.as_ref().map_or(line, |own| base::own_line(line, &self.text, own)))
     }
 
     /// Checks the scenario with the median of every parameter, with each parameter at each of its
@@ -518,15 +503,26 @@ fn describe(names: &[String], parameters: &Parameters) -> String {
 fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, ScenarioError> {
     let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| ScenarioError::Syntax {
         path: path.to_owned(),
-        line: locate::line_at(text, error.span().map_or(0, |span| span.start)),
+        line: Some(locate::line_at(text, error.span().map_or(0, |span| span.start))),
         message: error.message().to_owned(),
     })?;
     let in_set = |source| ScenarioError::Set { path: path.to_owned(), source };
-    Setting::check_together(settings, &document).map_err(in_set)?;
-    for setting in settings {
-        setting.apply(&mut document).map_err(in_set)?;
-    }
+    Setting::apply_all(settings, &mut document).map_err(in_set)?;
     Ok(document.to_string())
+}
+
+/// Returns the error of the setting that makes a file no scenario: with those before it the file
+/// can be read. `text` is the text without settings.
+fn wrong_setting(path: &Path, text: &str, settings: &[Setting]) -> ScenarioError {
+    let message_with = |count: usize| {
+        let changed = apply(path, text, &settings[..count]).ok()?;
+        let error = toml::from_str::<ScenarioConfig>(&changed).err()?;
+        Some(message_of(&changed, &error))
+    };
+    let wrong = (1..=settings.len()).rev().find(|count| message_with(count - 1).is_none()).unwrap_or(1);
+    let setting = settings[wrong - 1].to_string();
+    let message = message_with(wrong).unwrap_or_default();
+    ScenarioError::Set { path: path.to_owned(), source: SettingError::Value { setting, message } }
 }
 
 /// Returns the text with the list of the demands that its settings weakened.
@@ -536,20 +532,32 @@ fn with_overridden(text: &str, weakened: &[String]) -> String {
     document.to_string()
 }
 
-/// Converts an error of recorded traffic. Its line is the first one that contains `recorded`.
-fn recorded_error(path: &Path, text: &str, error: &RecordedError) -> ScenarioError {
-    let line = text.lines().position(|line| line.contains("recorded")).map_or(1, |index| index + 1);
+/// Converts an error of recorded traffic. Its line is the line of the key `recorded` of its actor.
+fn recorded_error(
+    path: &Path,
+    config: &ScenarioConfig,
+    origin: &locate::Origin,
+    error: &RecordedError,
+) -> ScenarioError {
+    let index = config.actors.iter().position(|actor| actor.id.as_str() == error.actor());
+    let keys = ["driver", "prescribed", "recorded"].map(|key| Segment::Key(key.to_owned()));
+    let actor = [Segment::Key("actor".to_owned()), Segment::Index(index.unwrap_or_default())];
+    let line = origin.line_of(&KeyPath(actor.into_iter().chain(keys).collect()));
     ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`recorded`: {error}") }
 }
 
-fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError> {
+fn deserialize(path: &Path, text: &str, origin: &locate::Origin) -> Result<ScenarioConfig, ScenarioError> {
     toml::from_str(text).map_err(|error: toml::de::Error| {
-        let offset = error.span().map_or(0, |span| span.start);
-        let line = locate::line_at(text, offset);
-        let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
-        let message = format!("{named}{}{}", without_rust_types(error.message()), suggestion(error.message()));
-        ScenarioError::Syntax { path: path.to_owned(), line, message }
+        let line = origin.line_at(text, error.span().map_or(0, |span| span.start));
+        ScenarioError::Syntax { path: path.to_owned(), line, message: message_of(text, &error) }
     })
+}
+
+/// Returns what is wrong with a text that is no scenario: the key, and what is allowed.
+fn message_of(text: &str, error: &toml::de::Error) -> String {
+    let offset = error.span().map_or(0, |span| span.start);
+    let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
+    format!("{named}{}{}", without_rust_types(error.message()), suggestion(error.message()))
 }
 
 /// The keys at the top level that no run uses: a parameter that only they name changes nothing.
@@ -682,6 +690,37 @@ mod tests {
         // A parameter that nothing resembles is unused.
         let (error, _) = parse("\"$closing-mps\"", "8.0");
         assert!(matches!(error, ScenarioError::UnusedParameter { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_setting_that_the_scenario_cannot_have_is_named_and_no_line() {
+        let parse = |settings: &[&str]| {
+            let settings: Vec<Setting> = settings.iter().map(|text| text.parse().unwrap()).collect();
+            let text = super::super::library::text("low-thw-overtake").unwrap();
+            ScenarioFile::parse(Path::new("a.toml"), text, &settings).and_then(|file| file.check().map(|()| file))
+        };
+        let named = parse(&["duration-s=30", "sensors.additional-rear-cameras=[{name='wide',x-m=-2}]", "brake-mps2=6"]);
+        let error = named.unwrap_err();
+        assert!(!error.is_setting() && error.line().is_none(), "{error}");
+        let message = error.to_string();
+        let begin = "failed to apply a setting to a.toml: `sensors.additional-rear-cameras=[{name='wide',x-m=-2}]`: `x-m`: unknown field `x-m`";
+        assert!(message.starts_with(begin), "{message}");
+        assert!(parse(&["actor=3"]).unwrap_err().to_string().contains("`actor=3`: "));
+        let error = parse(&["sensors.additional-rear-cameras=[{name='wide',yaw-deg=60}]"]).unwrap_err();
+        assert!(
+            error.to_string().starts_with("failed to check a.toml: `sensors.additional-rear-cameras[0].yaw-deg` is 60"),
+            "{error}"
+        );
+        // A list that is replaced moves the lines below it, and not the lines of the file.
+        let error = parse(&["fault.rear-lidar=[{dead=true}]", "actor.2.start.behind.gap-m=-5"]).unwrap_err();
+        let text = super::super::library::text("low-thw-overtake").unwrap();
+        let line = text.lines().position(|line| line.contains("behind") && line.contains("gap-m")).unwrap() + 1;
+        assert_eq!(error.line(), Some(line), "{error}");
+        let file = parse(&[
+            "sensors.additional-rear-cameras=[{name='a'},{name='b'}]",
+            "sensors.additional-rear-cameras[1].yaw-deg=20",
+        ]);
+        assert_eq!(file.unwrap().config().sensors.additional_rear_cameras.len(), 2);
     }
 
     #[test]

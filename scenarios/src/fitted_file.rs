@@ -64,7 +64,7 @@ impl FittedFile {
         let text = closecall_traffic::input::read_text(path).map_err(read)?;
         let hash = blake3::hash(text.as_bytes()).to_hex();
         let source = format!("from {} (blake3 {})", path.display(), hash.get(..16).unwrap_or_default());
-        let wrong = |message: String| ScenarioError::Syntax { path: path.to_owned(), line: 1, message };
+        let wrong = |message: String| ScenarioError::Syntax { path: path.to_owned(), line: Some(1), message };
         let mut document: toml::Table =
             text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_owned()))?;
         let mut table = |name: &str| match document.remove(name) {
@@ -112,7 +112,7 @@ impl FittedFile {
     }
 
     fn refused(&self, message: String) -> ScenarioError {
-        ScenarioError::Syntax { path: self.path.clone(), line: 1, message }
+        ScenarioError::Syntax { path: self.path.clone(), line: Some(1), message }
     }
 
     fn as_settings(&self, replaced: &[(ParameterName, ParameterConfig)]) -> Result<Vec<Setting>, ScenarioError> {

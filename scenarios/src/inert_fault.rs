@@ -4,6 +4,7 @@ use closecall_sensors::camera::{Camera, Pipeline};
 use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
+use closecall_traffic::suggest::hint;
 use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road};
 
 use super::inert_object_fault::{refuse_of_map, refuse_of_objects, refuse_of_radars};
@@ -74,7 +75,11 @@ fn refuse_of_lidars(
         let half_deg = lidars.iter().filter(is_meant).map(Lidar::half_field_deg).fold(f64::INFINITY, f64::min);
         if !half_deg.is_finite() {
             let names: Vec<&str> = lidars.iter().map(Lidar::name).collect();
-            return Err(at(sensor, index, without_sensor("LiDAR", &names)));
+            return Err(at(
+                sensor,
+                index,
+                without_sensor("LiDAR", entry.sensor.as_deref().unwrap_or_default(), &names),
+            ));
         }
         for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
             let within = Range::closed(-half_deg, half_deg);
@@ -90,8 +95,9 @@ fn refuse_of_lidars(
 }
 
 /// Returns the error of an entry that names no sensor of this kind.
-fn without_sensor(kind: &str, names: &[&str]) -> ConfigError {
-    let rule = format!("no such {kind} has this name, only `{}`", names.join("`, `"));
+fn without_sensor(kind: &str, name: &str, names: &[&str]) -> ConfigError {
+    let others = names.join("`, `");
+    let rule = format!("no {kind} is called `{name}`, only `{others}`{}", hint(name, &format!("`{others}`")));
     ConfigError::new("sensor", Problem::Contradiction { other: "sensors", rule })
 }
 
@@ -106,7 +112,7 @@ fn refuse_of_cameras(fault: &FaultConfig, sensors: &Sensors) -> Result<(), Confi
     for (index, entry) in fault.rear_camera.iter().enumerate() {
         let Some(name) = &entry.sensor else { continue };
         let error = match cameras.iter().find(|camera| camera.name == name) {
-            None => without_sensor("camera", &cameras.iter().map(|camera| camera.name).collect::<Vec<_>>()),
+            None => without_sensor("rear camera", name, &cameras.iter().map(|camera| camera.name).collect::<Vec<_>>()),
             Some(camera) if !is_used(camera, sensors) => contradiction("sensor", "sensors", NOT_USED),
             Some(_) => continue,
         };

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use closecall_sensors::lidar::{LidarConfig, LidarKindConfig};
 use closecall_traffic::input::read_text;
+use closecall_traffic::{KeyPath, Segment};
 use toml_edit::{DocumentMut, Item, TableLike, Value};
 
 use super::{ScenarioConfig, ScenarioError, locate};
@@ -19,12 +20,17 @@ const BEAMS: [&str; 2] = ["beams-file", "beams"];
 
 /// Puts the contents of each pattern file in place of its name, in the contents of a scenario file
 /// and in its text. Returns the text, or `None` if no pattern file is named. `path` is the path of
-/// the scenario file.
+/// the scenario file, and `origin` has its lines.
 ///
 /// # Errors
 /// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong
 /// key.
-pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, ScenarioError> {
+pub(super) fn inline(
+    path: &Path,
+    text: &str,
+    origin: &locate::Origin,
+    config: &mut ScenarioConfig,
+) -> Result<Option<String>, ScenarioError> {
     let mut document: Option<DocumentMut> = None;
     for ((key, index), lidar) in lidars(config) {
         let element = index.map_or_else(String::new, |index| format!("[{index}]"));
@@ -39,7 +45,9 @@ pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Re
             _ => continue,
         };
         let syntax = |message: &str| {
-            let line = text.lines().position(|line| line.contains(KEYS[0])).map_or(1, |index| index + 1);
+            let key_of = |key: &str| Segment::Key(key.to_owned());
+            let lidar = [key_of("sensors"), key_of(key)].into_iter().chain(index.map(Segment::Index));
+            let line = origin.line_of(&KeyPath(lidar.chain([key_of(KEYS[0])]).collect()));
             ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`{}`: {message}", KEYS[0]) }
         };
         if lidar.pattern_file.is_some() && lidar.pattern.is_some() {
@@ -88,7 +96,7 @@ fn read(path: &Path, key: &str) -> Result<(LidarKindConfig, toml_edit::InlineTab
         let source = std::io::Error::new(source.kind(), format!("`{key}` names this file: {source}"));
         ScenarioError::Read { path: path.to_owned(), source }
     })?;
-    let syntax = |line, message| ScenarioError::Syntax { path: path.to_owned(), line, message };
+    let syntax = |line, message| ScenarioError::Syntax { path: path.to_owned(), line: Some(line), message };
     let config = LidarKindConfig::parse(&text).map_err(|error| {
         let line = locate::line_at(&text, error.span().map_or(0, |span| span.start));
         syntax(line, error.message().to_owned())
@@ -104,7 +112,7 @@ fn read(path: &Path, key: &str) -> Result<(LidarKindConfig, toml_edit::InlineTab
 
 /// Returns a pattern as a table of TOML. `path` is the path of the file that has it.
 fn as_table(config: &LidarKindConfig, path: &Path) -> Result<toml_edit::InlineTable, ScenarioError> {
-    let syntax = |message| ScenarioError::Syntax { path: path.to_owned(), line: 1, message };
+    let syntax = |message| ScenarioError::Syntax { path: path.to_owned(), line: Some(1), message };
     let plain = toml::to_string(config).map_err(|error| syntax(error.to_string()))?;
     let document: DocumentMut = plain.parse().map_err(|error: toml_edit::TomlError| syntax(error.to_string()))?;
     Ok(document.as_table().clone().into_inline_table())
@@ -115,7 +123,7 @@ fn as_table(config: &LidarKindConfig, path: &Path) -> Result<toml_edit::InlineTa
 fn with_beams(path: &Path, config: LidarKindConfig, key: &str) -> Result<LidarKindConfig, ScenarioError> {
     let Some(name) = &config.beams_file else { return Ok(config) };
     let table = path.with_file_name(name);
-    let syntax = |line, message| ScenarioError::Syntax { path: table.clone(), line, message };
+    let syntax = |line, message| ScenarioError::Syntax { path: table.clone(), line: Some(line), message };
     if config.beams.is_some() {
         return Err(syntax(1, format!("`{key}` contradicts `{}`: one of the two describes the LiDAR", BEAMS[1])));
     }

@@ -3,18 +3,80 @@
 use closecall_traffic::{KeyPath, Segment};
 use toml_edit::{Document, Item, Table, TableLike, Value};
 
+/// The text of a file, in which lines are counted, and the text that was made of it.
+#[derive(Clone, Debug)]
+pub(super) struct Origin {
+    /// The text of the file.
+    file: String,
+    /// The text with the keys of its base and the settings; `None` if the file has neither.
+    whole: Option<String>,
+}
+
+impl Origin {
+    pub(super) fn new(file: &str, whole: &str) -> Self {
+        Self { file: file.to_owned(), whole: (file != whole).then(|| whole.to_owned()) }
+    }
+
+    /// Returns the line, counted from 1, of the deepest part of `path` that the whole text contains.
+    /// Returns `None` if this part is not in the file: its base or a setting has it.
+    pub(super) fn line_of(&self, path: &KeyPath) -> Option<usize> {
+        let (line, depth) = deepest(&self.file, path)?;
+        let is_in_file =
+            self.whole.as_ref().is_none_or(|whole| deepest(whole, path).is_some_and(|(_, in_whole)| in_whole == depth));
+        is_in_file.then_some(line)
+    }
+
+    /// Returns the line, counted from 1, of a byte offset of `text`: the text of the file, or the
+    /// text with the keys of its base. Returns `None` if the file does not contain the key there.
+    pub(super) fn line_at(&self, text: &str, offset: usize) -> Option<usize> {
+        match &self.whole {
+            None => Some(line_at(text, offset)),
+            Some(_) => self.line_of(&path_at(text, offset)),
+        }
+    }
+}
+
 /// Returns the line, counted from 1, of the deepest part of `path` that the text contains. Returns
 /// `None` if the text contains no part of it.
 pub(super) fn line_of(text: &str, path: &KeyPath) -> Option<usize> {
+    deepest(text, path).map(|(line, _)| line)
+}
+
+/// Returns the line of the deepest part of `path` that the text contains, and the number of its
+/// segments.
+fn deepest(text: &str, path: &KeyPath) -> Option<(usize, usize)> {
     let document = Document::parse(text).ok()?;
     let mut node = Node::Item(document.as_item());
-    let mut offset = None;
-    for segment in &path.0 {
+    let mut found = None;
+    for (depth, segment) in path.0.iter().enumerate() {
         let Some((next, at)) = node.descend(segment) else { break };
-        offset = at.or(offset);
+        let offset = at.or(found.map(|(offset, _)| offset));
+        found = offset.map(|offset| (offset, depth + 1));
         node = next;
     }
-    offset.map(|offset| line_at(text, offset))
+    found.map(|(offset, depth)| (line_at(text, offset), depth))
+}
+
+/// Returns the path of the last key or element of a list that begins at a byte offset or before it.
+fn path_at(text: &str, offset: usize) -> KeyPath {
+    let Ok(document) = Document::parse(text) else { return KeyPath::default() };
+    let mut last = (0, KeyPath::default());
+    collect(&Node::Item(document.as_item()), &KeyPath::default(), offset, &mut last);
+    last.1
+}
+
+/// Takes over each path at or below `path` that begins before `limit`, and not before the last one.
+fn collect(node: &Node<'_>, path: &KeyPath, limit: usize, last: &mut (usize, KeyPath)) {
+    for segment in node.segments() {
+        let Some((child, at)) = node.descend(&segment) else { continue };
+        let inner = KeyPath(path.0.iter().cloned().chain([segment]).collect());
+        // The header of a table begins before its key.
+        let begin = child.header().or(at);
+        if let Some(begin) = begin.filter(|begin| (last.0..=limit).contains(begin)) {
+            *last = (begin, inner.clone());
+        }
+        collect(&child, &inner, limit, last);
+    }
 }
 
 /// Returns the line, counted from 1, of a byte offset.
@@ -41,6 +103,28 @@ impl<'a> Node<'a> {
             }
             Segment::Index(index) => self.element(*index),
         }
+    }
+
+    /// Returns the steps to the nodes directly below this one.
+    fn segments(&self) -> Vec<Segment> {
+        let count = match self {
+            Self::Item(Item::ArrayOfTables(tables)) => tables.len(),
+            Self::Item(item) => item.as_array().map_or(0, toml_edit::Array::len),
+            Self::Value(value) => value.as_array().map_or(0, toml_edit::Array::len),
+            Self::Table(_) => 0,
+        };
+        let keys = self.table().into_iter().flat_map(|table| table.iter());
+        keys.map(|(key, _)| Segment::Key(key.to_owned())).chain((0..count).map(Segment::Index)).collect()
+    }
+
+    /// Returns the byte offset of the header of a table that has one.
+    fn header(&self) -> Option<usize> {
+        let table = match self {
+            Self::Item(Item::Table(table)) => table,
+            Self::Table(table) => *table,
+            _ => return None,
+        };
+        table.span().map(|span| span.start)
     }
 
     fn table(&self) -> Option<&'a dyn TableLike> {
@@ -95,6 +179,31 @@ then = { brake = { deceleration-mps2 = -1 } }
         assert_eq!(line(&["name"]), Some(1));
         assert_eq!(line(&["actor", "0", "driver", "ego-stack", "acc", "time-gap-s"]), Some(4));
         assert_eq!(line(&["actor", "1", "event", "0", "then", "brake", "deceleration-mps2"]), Some(9));
+    }
+
+    #[test]
+    fn the_key_at_an_offset_is_found_in_tables_arrays_and_inline_tables() {
+        for (words, path) in [
+            ("'x'", "name"),
+            ("9 }", "actor[0].driver.ego-stack.acc.time-gap-s"),
+            ("[[actor]]\nid = 'rear'", "actor[1]"),
+            ("'rear'", "actor[1].id"),
+            ("[[actor.event]]", "actor[1].event[0]"),
+            ("-1", "actor[1].event[0].then.brake.deceleration-mps2"),
+        ] {
+            assert_eq!(path_at(TEXT, TEXT.find(words).unwrap()).to_string(), path, "{words}");
+        }
+        assert_eq!(path_at("[a.b]\nc = [1, [2, 3]]", "[a.b]\nc = [1, [2, ".len()).to_string(), "a.b.c[1][1]");
+    }
+
+    #[test]
+    fn a_key_of_the_base_or_of_a_setting_has_no_line() {
+        let path = |keys: &[&str]| KeyPath(keys.iter().map(|key| Segment::Key((*key).to_owned())).collect());
+        let origin = Origin::new("base = 'x'\n[a]\nb = 1\n", "[a]\nb = 1\nc = 2\n[d]\ne = 3\n");
+        assert_eq!(origin.line_of(&path(&["a", "b"])), Some(3));
+        assert_eq!(origin.line_of(&path(&["a", "c"])), None, "of the base");
+        assert_eq!(origin.line_of(&path(&["d", "e"])), None);
+        assert_eq!(origin.line_of(&path(&["a", "x"])), Some(2), "of none of both");
     }
 
     #[test]

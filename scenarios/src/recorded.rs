@@ -45,6 +45,15 @@ pub(super) enum RecordedError {
     },
 }
 
+impl RecordedError {
+    /// Returns the name of the actor.
+    pub(super) fn actor(&self) -> &str {
+        match self {
+            Self::TrajectoryData { actor, .. } | Self::NoSuchTrack { actor, .. } | Self::Form { actor } => actor,
+        }
+    }
+}
+
 /// Replaces every `recorded` by its speed profile, in the contents of a file and in its text.
 /// Returns the text, or `None` if there is no `recorded`. `path` is the path of the scenario file.
 pub(super) fn inline(path: &Path, text: &str, config: &mut ScenarioConfig) -> Result<Option<String>, RecordedError> {

@@ -94,7 +94,7 @@ pub(super) fn written(
     (source, settings): (&Path, &[Setting]),
 ) -> Result<ScenarioFile, ScenarioError> {
     let text = config.and_then(|config| scenario_text(&config));
-    let text = text.map_err(|message| ScenarioError::Syntax { path: source.to_owned(), line: 1, message })?;
+    let text = text.map_err(|message| ScenarioError::Syntax { path: source.to_owned(), line: Some(1), message })?;
     let file = ScenarioFile::parse(source, &text, settings)?;
     file.check()?;
     Ok(file)

@@ -299,8 +299,9 @@ pub(super) struct SetArgs {
 /// The option of [`SetArgs`].
 #[derive(Args)]
 struct SetOption {
-    /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`)
-    /// or by a parameter (`brake-mps2=6`); can be given more than once. In a campaign
+    /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`),
+    /// with an element of a list by its index (`actor[2].…`), or by a parameter (`brake-mps2=6`); a
+    /// whole list is TOML (`'fault.rear-lidar=[{dead=true}]'`); can be given more than once. In a campaign
     /// `ARM:KEY=VALUE` sets a value of the ego stack in one arm (`acc+aeb:aeb.trigger-mps2=5`)
     #[arg(long = "set", value_name = "KEY=VALUE", help_heading = heading::SCENARIO)]
     settings: Vec<Setting>,

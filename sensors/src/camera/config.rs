@@ -45,7 +45,8 @@ pub enum Pipeline {
     Off,
 }
 
-/// The position of the sun, as a scenario file describes it.
+/// The position of the sun as a scenario file describes it. Only `rear-camera` has this table: all
+/// cameras are under the same sky.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct SunConfig {
@@ -62,7 +63,9 @@ impl Default for SunConfig {
     }
 }
 
-/// The rear camera as a scenario file describes it.
+/// A rear camera as a scenario file describes it. `rear-camera` is the first one, and
+/// `additional-rear-cameras` lists up to three others, each with a name, a place and a direction of
+/// its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct CameraConfig {
@@ -111,7 +114,7 @@ pub struct CameraConfig {
     /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic
     /// exposure.
     pub exposure_ev: Num,
-    /// Position of the sun.
+    /// Position of the sun; a further camera has the first one's.
     pub sun: SunConfig,
     /// The lens.
     pub lens: LensConfig,
@@ -119,7 +122,8 @@ pub struct CameraConfig {
     /// shutter, 0.01 to 0.03 for a rolling one.
     pub readout_s: Num,
     /// Brightness of the night sky, relative to the sky over a town, which the default shows (0 to
-    /// 1). Far from towns it is about 0.03: 0.2 instead of 7 mcd/m².
+    /// 1). Far from towns it is about 0.03: 0.2 instead of 7 mcd/m². A further camera has the first
+    /// one's.
     pub night_sky: Num,
 }
 

@@ -48,7 +48,7 @@ impl MaskRcnnInput {
     }
 }
 
-/// The Mask R-CNN of the rear camera as a scenario file describes it.
+/// The Mask R-CNN of a rear camera as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct MaskRcnnConfig {

@@ -28,7 +28,7 @@ pub const FOCAL_PX: f64 = WIDTH_PX as f64 / 2.0 * 1.732_050_807_568_877_2;
 const WIDTHS_PX: std::ops::RangeInclusive<u64> = 640..=3_848;
 const HEIGHTS_PX: std::ops::RangeInclusive<u64> = 480..=2_168;
 
-/// The size of the camera's image as a scenario file describes it.
+/// The size of a camera's image as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct ResolutionConfig {

@@ -53,8 +53,10 @@ const READING: &str = "
   `\"$name\"` where the table says so.
 - *Default* is the value of an absent key. A *required* key has no default. `-` means that an absent key has no effect, or
   that the text says what holds.
-- `--set` changes a value by the path in the heading of its section, with the name of an actor after `actor`:
-  `--set actor.rear.start.behind.gap-m=90`. The name of a parameter alone fixes the parameter: `--set brake-mps2=6`.
+- `--set` changes a value by the path in the heading of its section. The name of a parameter alone fixes the parameter:
+  `--set brake-mps2=6`. After the key of a list comes an element: its `id` or `name`, or its index, from 0:
+  `--set actor.rear.start.behind.gap-m=90`, `--set actor[2].start.behind.gap-m=90`. A whole list is a value of TOML, which
+  also gives a list that the file leaves out: `--set 'sensors.additional-rear-cameras=[{ name = \"left\", yaw-deg = 40 }]'`.
 
 ";
 
