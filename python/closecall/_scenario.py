@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -20,8 +21,8 @@ class Scenario:
     def load(cls, source: str | os.PathLike[str], set: Mapping[str, object] | None = None) -> Scenario:
         """Reads a scenario file, or the scenario of the library with that name.
 
-        ``set`` changes single values, named by a path of keys (``"actor.rear.start.behind.gap-m"``) or by a parameter
-        (``"brake-mps2"``).
+        ``set`` changes values, named by a path of keys (``"actor.rear.start.behind.gap-m"``) or by a parameter
+        (``"brake-mps2"``). A list replaces a whole list (``{"fault.rear-lidar": [{"dead": True}]}``).
 
         Raises :class:`InputError` with file, line and key if the scenario cannot be used, :class:`UsageError` if a
         setting cannot be applied, :class:`FileError` if the file cannot be read.
@@ -71,8 +72,19 @@ class Scenario:
 
 def _toml(value: object) -> str:
     """Returns a value as ``--set`` takes it."""
+    return value if isinstance(value, str) else _inner_toml(value)
+
+
+def _inner_toml(value: object) -> str:
+    """Returns a value as TOML, in which texts have quotes."""
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(str(key))} = {_inner_toml(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_inner_toml(inner) for inner in value) + "]"
     return str(value)
 
 

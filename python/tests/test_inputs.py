@@ -77,6 +77,17 @@ def test_a_report_names_the_call(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out" / "manifest.json").read_text())["command"] == [call]
 
 
+def test_a_list_of_a_scenario_is_replaced_and_its_elements_are_set() -> None:
+    cameras = [{"name": "left", "yaw-deg": 40, "pipeline": "off"}, {"name": "right", "yaw-deg": -40.5}]
+    settings = {"sensors.additional-rear-cameras": cameras, "sensors.additional-rear-cameras[1].yaw-deg": -30}
+    text = cc.Scenario.load("low-thw-overtake", set=settings).text
+    assert '"pipeline" = "off"' in text and "-30" in text and "-40.5" not in text
+    with pytest.raises(cc.UsageError, match="the list `actor` has the elements 0 to 2, named `ego`, `front`, `rear`"):
+        cc.Scenario.load("low-thw-overtake", set={"actor[3].id": "x"})
+    with pytest.raises(cc.InputError, match="unknown field `yaw`"):
+        cc.Scenario.load("low-thw-overtake", set={"sensors.additional-rear-cameras": [{"name": "left", "yaw": 40}]})
+
+
 def test_a_campaign_needs_a_scenario() -> None:
     with pytest.raises(cc.UsageError, match="scenarios: none is named"):
         cc.campaign([], 2)
