@@ -158,7 +158,7 @@ fn each_wrong_answer_ends_the_sample_and_names_the_field() {
         return;
     }
     for (kind, fault, stated) in [
-        ("tracks", "nan", "`x_m` must be a finite number, it is NaN"),
+        ("tracks", "nan", "`tracks[0].x_m` must be a finite number, it is NaN"),
         ("tracks", "size", "`tracks[0].covariance` must be a list of 4 lists of 4 numbers"),
         ("tracks", "negative-variance", "`tracks[0].covariance[1][1]` must be a variance"),
         ("tracks", "unknown-class", "`tracks[0].class.bus` must be a class: car, truck, motorcycle or background"),
@@ -174,7 +174,7 @@ fn each_wrong_answer_ends_the_sample_and_names_the_field() {
         ),
         ("tracks", "hello", "the sensors failed to perceive: `"),
         ("tracks", "hello", "`answers` must be \"detections\" or \"tracks\", it is \"boxes\""),
-        ("detections", "nan", "`x_m` must be a finite number, it is NaN"),
+        ("detections", "nan", "`detections[0].x_m` must be a finite number, it is NaN"),
         ("detections", "size", "`detections[0].covariance` must be a list of 2 lists of 2 numbers"),
         ("detections", "negative-variance", "`detections[0].covariance[1][1]` must be a variance"),
         ("detections", "unknown-class", "`detections[0].class.bus` must be a class"),

@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 
 use closecall_sensors::external::PerceptionAnswer;
 use closecall_sensors::{Detection, Extent, SeenBy, SeenPart};
-use closecall_traffic::{ClassScores, Range, Source, Time, Track, TrackId, TrackStatus, VehicleClass, maths};
+use closecall_traffic::{
+    ClassScores, KeyPath, Range, Segment, Source, Time, Track, TrackId, TrackStatus, VehicleClass, maths,
+};
 use nalgebra::{Matrix4, Vector4};
 use serde_json::{Map, Value};
 
@@ -150,8 +152,16 @@ fn parsed(object: &Map<String, Value>, kind: Kind, time: Time) -> Result<Percept
     let key = kind.key();
     let list = object.get(key);
     let elements = list.and_then(Value::as_array).filter(|list| list.len() <= MOST_OBJECTS);
-    let elements =
-        elements.ok_or_else(|| Wrong::new(key.to_owned(), format!("a list of at most {MOST_OBJECTS}"), list))?;
+    let elements = elements.ok_or_else(|| {
+        let wrong = Wrong::new(key.to_owned(), format!("a list of at most {MOST_OBJECTS}"), list);
+        let other = [Kind::Detections, Kind::Tracks].into_iter().find(|other| *other != kind).map(Kind::key);
+        let actual = match (list, other.filter(|other| object.contains_key(*other))) {
+            (Some(Value::Array(list)), _) => format!("a list of {}", list.len()),
+            (None, Some(other)) => format!("absent, and `{other}` is there: the greeting says `\"answers\":\"{key}\"`"),
+            _ => return wrong,
+        };
+        Wrong { actual, ..wrong }
+    })?;
     let object_at = |(index, value): (usize, &Value)| match value {
         Value::Object(object) => Ok(Object { path: format!("{key}[{index}]"), object: object.clone() }),
         other => Err(Wrong::new(format!("{key}[{index}]"), "an object", Some(other))),
@@ -383,31 +393,39 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, AnswerError> {
     }
 }
 
-/// Returns the first word of a line that is NaN or infinite, behind the key that it belongs to;
-/// `None` if there is none.
+/// Returns the first word of a line that is NaN or infinite, behind the path of its field; `None` if
+/// there is none.
 fn not_finite(line: &[u8]) -> Option<(String, String)> {
     let text = std::str::from_utf8(line).ok()?;
-    let (mut key, mut word_start, mut in_string) = (String::new(), None, None);
+    let (mut path, mut word_start, mut in_string) = (Vec::new(), None, None);
     for (at, character) in text.char_indices() {
         match (in_string, character) {
             (Some(start), '"') => {
                 // A text behind which a colon stands is a key.
                 let after = text.get(at + 1..)?.trim_start();
-                if after.starts_with(':') {
-                    key = text.get(start..at)?.to_owned();
+                if let Some(Segment::Key(key)) = path.last_mut()
+                    && after.starts_with(':')
+                {
+                    text.get(start..at)?.clone_into(key);
                 }
                 in_string = None;
             }
             (Some(_), _) => {}
             (None, '"') => in_string = Some(at + 1),
-            (None, ',' | ']' | '}' | '[' | ':' | ' ') => {
+            (None, ',' | ']' | '}' | '[' | '{' | ':' | ' ') => {
                 if let Some(word) = word_start.take().and_then(|start| text.get(start..at))
                     && word.parse::<f64>().is_ok_and(|number| !number.is_finite())
                 {
-                    return Some((key, word.to_owned()));
+                    return Some((KeyPath(path).to_string(), word.to_owned()));
+                }
+                match (character, path.last_mut()) {
+                    ('{', _) => path.push(Segment::Key(String::new())),
+                    ('[', _) => path.push(Segment::Index(0)),
+                    (',', Some(Segment::Index(index))) => *index += 1,
+                    (']' | '}', _) => drop(path.pop()),
+                    _ => {}
                 }
             }
-            (None, '{') => {}
             (None, _) => {
                 word_start.get_or_insert(at);
             }
@@ -485,8 +503,10 @@ mod tests {
     #[test]
     fn a_wrong_field_of_a_track_is_named_with_what_is_needed() {
         for (change, stated) in [
-            (["-40.5", "NaN"], "`x_m` must be a finite number, it is NaN"),
-            (["-40.5", "-Infinity"], "`x_m` must be a finite number, it is -Infinity"),
+            (["-40.5", "NaN"], "`tracks[0].x_m` must be a finite number, it is NaN"),
+            (["-40.5", "-Infinity"], "`tracks[0].x_m` must be a finite number, it is -Infinity"),
+            (["[0,0.01,0,0]", "[0, NaN,0,0]"], "`tracks[0].covariance[1][1]` must be a finite number, it is NaN"),
+            (["0.75", "NaN"], "`tracks[0].class.car` must be a finite number, it is NaN"),
             (["-40.5", "null"], "`tracks[0].x_m` must be a number from -500 to 500, it is null"),
             (["-40.5", "-4000"], "`tracks[0].x_m` must be a number from -500 to 500, it is -4000"),
             (["\"vx_mps\":36,", ""], "`tracks[0].vx_mps` must be a number from -150 to 150, it is absent"),
@@ -535,7 +555,10 @@ mod tests {
         for (line, stated) in [
             (r#"{"tracks":[]}"#, "`time_ns` must be 80000000, the `time_ns` of the question, it is absent"),
             (r#"{"time_ns":80000000}"#, "`tracks` must be a list of at most 256, it is absent"),
-            (r#"{"time_ns":80000000,"detections":[]}"#, "`tracks` must be a list"),
+            (
+                r#"{"time_ns":80000000,"detections":[]}"#,
+                "`tracks` must be a list of at most 256, it is absent, and `detections` is there: the greeting says",
+            ),
             (r#"{"time_ns":80000000,"tracks":[1]}"#, "`tracks[0]` must be an object, it is 1"),
             ("[]", "answered \"[]\": it must be an object of JSON"),
             ("null", "answered \"null\": it must be an object of JSON"),
@@ -546,7 +569,7 @@ mod tests {
             assert!(error.contains(stated), "{line}: {error}");
         }
         let many = vec![TRACK; 257].join(",");
-        assert!(answer(Kind::Tracks, &many).unwrap_err().contains("a list of at most 256"));
+        assert!(answer(Kind::Tracks, &many).unwrap_err().contains("a list of at most 256, it is a list of 257"));
         assert_eq!(kind(br#"{"answers":"tracks"}"#), Ok(Kind::Tracks));
         assert!(
             kind(br#"{"answers":"boxes"}"#).unwrap_err().to_string().contains("`answers` must be \"detections\" or")
