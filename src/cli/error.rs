@@ -247,6 +247,7 @@ fn point_remedy(problem: &ScanFileProblem) -> &'static str {
         ScanFileProblem::Point(PointError::NotFinite { quantity: "x" | "y" | "z", .. }) => {
             "; --drop-invalid leaves out points without a position"
         }
+        ScanFileProblem::Point(PointError::Frame { .. }) => "; --frame names the frame",
         _ => "",
     }
 }

@@ -365,9 +365,15 @@ fn a_recording_in_the_documented_layout_runs_with_the_documentation_alone() {
     for (key, most) in [("along_rmse_m", 0.3), ("across_rmse_m", 0.1), ("speed_rmse_mps", 1.0)] {
         assert!(all[key].as_f64().unwrap() < most, "{key}: {all}");
     }
-    // The points are not in the ego's frame: most are far from where a vehicle can be, and nothing is tracked there.
-    let (ego, _) = perceive(&recording, &scenario, &["--drop-invalid"]);
-    assert_eq!(ego["truth"]["groups"][0]["recall"], 0.0, "{ego}");
+    // The points are not in the ego's frame.
+    let paths = [&recording, &scenario].map(|path| path.to_str().unwrap());
+    let ego = closecall(["study", "perceive", paths[0], paths[1], "--drop-invalid"]);
+    let text = message(&ego);
+    assert_eq!(code(&ego), 3, "{text}");
+    assert!(
+        text.contains("points lie behind the LiDAR `rear-lidar`") && text.contains("--frame names the frame"),
+        "{text}"
+    );
     // Without labels, nothing is said of them.
     std::fs::remove_file(recording.join("labels.csv")).unwrap();
     let args = ["study", "perceive", recording.to_str().unwrap(), scenario.to_str().unwrap(), "--frame", "sensor"];

@@ -20,6 +20,9 @@ use super::viewpoint::{deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, MirrorSide, ScanEchoes};
 use closecall_traffic::Environment;
 
+/// Distance from which on no LiDAR has a return (m): the largest `max-range-m` of a pattern.
+const FARTHEST_M: f64 = 500.0;
+
 /// Intensity of the points of a sensor that records none (assumption): neither a droplet nor a
 /// registration plate.
 const UNKNOWN_INTENSITY: f32 = 0.3;
@@ -104,6 +107,19 @@ pub enum PointError {
         lidar: &'static str,
         /// The last beam of its pattern.
         last: usize,
+    },
+    /// Most points lie where the LiDAR cannot see: their frame or their unit is another.
+    #[error(
+        "{unseen} of {points} points lie behind the LiDAR `{lidar}` of the scenario, or more than {FARTHEST_M} m from it: metres \
+         are needed, in the frame of the ego or else of the sensor"
+    )]
+    Frame {
+        /// Number of these points.
+        unseen: usize,
+        /// Number of all points of the scan.
+        points: usize,
+        /// Name of the LiDAR.
+        lidar: &'static str,
     },
     /// A point was measured outside of its scan.
     #[error(
@@ -191,17 +207,21 @@ impl RecordedPoints {
         let mounting = Mounting::new(lidar, ego_length_m);
         let pattern = Pattern::shared(lidar.kind);
         let mut outside = 0;
+        let seen_m = |point: usize| {
+            let at_m = Vector3::from(std::array::from_fn(|axis| f64::from(self.at_m[axis][point])));
+            match frame {
+                PointFrame::Sensor => at_m,
+                PointFrame::Ego => mounting.sensor_from_ego * (at_m - mounting.sensor_m),
+            }
+        };
+        let is_unseen = |at_m: &Vector3<f64>| at_m.x < 0.0 || at_m.norm() > FARTHEST_M;
+        let unseen = (0..self.len()).map(seen_m).filter(is_unseen).count();
+        if 2 * unseen > self.len() {
+            return Err(PointError::Frame { unseen, points: self.len(), lidar: lidar.name() });
+        }
         if self.beam.is_none() {
-            let beams: Vec<Option<u16>> = (0..self.len())
-                .map(|point| {
-                    let at_m = Vector3::from(std::array::from_fn(|axis| f64::from(self.at_m[axis][point])));
-                    let seen_m = match frame {
-                        PointFrame::Sensor => at_m,
-                        PointFrame::Ego => mounting.sensor_from_ego * (at_m - mounting.sensor_m),
-                    };
-                    beam_towards(&seen_m, pattern, self.mirror_side)
-                })
-                .collect();
+            let towards = |point: usize| beam_towards(&seen_m(point), pattern, self.mirror_side);
+            let beams: Vec<Option<u16>> = (0..self.len()).map(towards).collect();
             let is_seen: Vec<bool> = beams.iter().map(Option::is_some).collect();
             outside = beams.len() - beams.iter().flatten().count();
             self.retain(&is_seen);
@@ -391,6 +411,27 @@ mod tests {
         // In 0.1 s the ego has driven 3 m away from the first point.
         assert!((scan.x_m[0] + 25.3).abs() < 1e-4, "{}", scan.x_m[0]);
         assert_eq!((scan.start, scan.offset_ns[0]), (Time::from_ms(20), 0));
+    }
+
+    #[test]
+    fn a_scan_in_another_frame_or_unit_is_refused() {
+        let lidar = Lidar::default();
+        let scan = |at_m: [[f32; 2]; 3], frame| {
+            let points =
+                RecordedPoints { at_m: at_m.map(Vec::from), beam: Some(vec![0, 1]), intensity: None, ..points() };
+            points.into_scan(&lidar, frame, 4.6, ScanMotion::default()).map(|(scan, _)| scan.len())
+        };
+        let behind = [[-20.0, -30.0], [0.0, 1.0], [0.5, 0.5]];
+        let ahead = [[20.0, 30.0], [0.0, 1.0], [0.0, 0.0]];
+        assert_eq!(scan(behind, PointFrame::Ego), Ok(2));
+        assert_eq!(scan(ahead, PointFrame::Sensor), Ok(2));
+        let millimetres = behind.map(|values| values.map(|value| 1000.0 * value));
+        let half = [[20.0, -30.0], [0.0, 1.0], [0.5, 0.5]];
+        assert_eq!(scan(half, PointFrame::Ego), Ok(2));
+        for (at_m, frame) in [(behind, PointFrame::Sensor), (ahead, PointFrame::Ego), (millimetres, PointFrame::Ego)] {
+            let message = scan(at_m, frame).unwrap_err().to_string();
+            assert!(message.starts_with("2 of 2 points lie behind the LiDAR `rear-lidar`"), "{message}");
+        }
     }
 
     #[test]
