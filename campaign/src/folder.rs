@@ -19,7 +19,7 @@
 //! ```
 
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::outcome::Outcome;
@@ -270,13 +270,28 @@ impl Folder {
         Ok(trust::remember(&hash).map_err(|source| WriteError::new(&self.path, source))?)
     }
 
+    /// Returns the error of a manifest that cannot be read: a path that is no folder, and a folder
+    /// without results, are said to be such.
+    fn without_campaign(&self, source: io::Error) -> FolderError {
+        let is_absent = source.kind() == ErrorKind::NotFound;
+        let (path, reason) = match fs::metadata(&self.path) {
+            Ok(there) if !there.is_dir() => (self.path.clone(), "it is a file, and the folder of a campaign is needed"),
+            Ok(_) if is_absent => {
+                (self.path.clone(), "the folder holds no results of a campaign: it has no manifest.json")
+            }
+            Ok(_) => return FolderError::Read { path: self.file(MANIFEST), source },
+            Err(source) => return FolderError::Read { path: self.path.clone(), source },
+        };
+        FolderError::Read { path, source: io::Error::new(source.kind(), reason) }
+    }
+
     /// Returns the manifest, and the BLAKE3 hash of its text.
     pub(crate) fn manifest_with_hash(&self) -> Result<(Manifest, String), FolderError> {
         let path = self.file(MANIFEST);
-        if !self.has(MANIFEST)? && self.has(rare::MANIFEST)? {
+        if self.path.is_dir() && !self.has(MANIFEST)? && self.has(rare::MANIFEST)? {
             return Err(FolderError::RareEvent { path: self.path.clone() });
         }
-        let text = read_text(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
+        let text = read_text(&path).map_err(|source| self.without_campaign(source))?;
         let content = |line, message| FolderError::Content { path: path.clone(), line, message };
         let not_json = |error: serde_json::Error| content(error.line(), json_fault(&text, &error));
         let value: serde_json::Value = serde_json::from_str(&text).map_err(not_json)?;

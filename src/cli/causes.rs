@@ -29,6 +29,7 @@ use super::actions::command_for;
 use super::advice::to_provide;
 use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
+use super::new::scenario_file;
 use super::output::{during, outln, print_error, print_text, print_written, textln, warn};
 use super::protect::{must_be_folder, must_be_writable, of_campaign, protect};
 use super::saved::SavedArgs;
@@ -134,7 +135,7 @@ pub(super) struct MinimizeArgs {
     saved: SavedArgs,
     /// Scenario file to write [default: SCENARIO-SAMPLE.toml, with --nearest SCENARIO-nearest.toml].
     /// The nearest case that passes is written beside it, with `-passes` at the end of its name
-    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", help_heading = heading::OUTPUT)]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE.toml", value_parser = scenario_file, help_heading = heading::OUTPUT)]
     output: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]

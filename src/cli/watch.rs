@@ -12,6 +12,7 @@ use closecall_report::run::rerun::{check_recording_possible, write_recording_unc
 use closecall_report::tables::{RunTables, TableFiles, companion_files};
 use closecall_scenarios::outcome::Outcome;
 use closecall_scenarios::{Scenario, Setting};
+use closecall_sensors::SensorMode;
 use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
@@ -151,6 +152,14 @@ fn run(
     (watch, is_filmed): (&WatchArgs, bool),
 ) -> Result<(Vec<Outcome>, Vec<Film>), CliError> {
     watch.record.as_deref().map(check_recording_possible).transpose()?;
+    let mode = arms.last().and_then(|arm| arm.sensors).unwrap_or_else(|| scenario.sensors.mode());
+    let of_lidars = [("--scans", &watch.scans), ("--clusters", &watch.clusters)];
+    if let Some((option, _)) = of_lidars.into_iter().find(|(_, path)| path.is_some() && mode != SensorMode::Full) {
+        let name = mode.name();
+        let message =
+            format!("{option} needs LiDARs: only sensors of mode `full` have them, and the run has mode `{name}`");
+        return Err(CliError::usage(message));
+    }
     check_backend_of(scenario, arms)?;
     let mut tables = RunTables::new((scenario, arms.last()), watch.tables())?;
     let mut osi = watch.osi.as_ref().map(|_| OsiRecorder::new(scenario, watch.osi_lanes));

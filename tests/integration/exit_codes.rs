@@ -210,6 +210,12 @@ fn wrong_usage_ends_with_2() {
         vec!["run", headline, "--set", "actor.nobody.id=x"],
         vec!["run", headline, "--set", "actor.rear=3"],
         vec!["run", headline, "--set", "no-such-parameter=3"],
+        vec!["run", headline, "--set", "actor[3].id=x"],
+        vec!["run", headline, "--set", "fault.rear-lidar[0].dead=true"],
+        vec!["run", headline, "--set", "actor=[{id=me}]"],
+        vec!["run", headline, "--sensors", "object", "--scans", "scans.parquet"],
+        vec!["run", headline, "--sensors", "ground-truth", "--clusters", "clusters.parquet"],
+        vec!["minimize", "closecall-results", "3", "--out", "scenario.txt"],
         vec!["run", headline, "--trace", "trace.txt"],
         vec!["run", headline, "--scans", "scans.csv"],
         vec!["run", headline, "--tracks", "tracks.csv"],
@@ -235,9 +241,55 @@ fn a_replay_of_a_missing_sample_or_campaign_is_an_error() {
         0,
     );
     assert_eq!(code(&closecall(["replay", out.to_str().unwrap(), "4"])), 2);
-    assert_eq!(code(&closecall(["replay", folder.path().to_str().unwrap(), "0"])), 6);
+    let refused = |args: &[&str], stated: &str| {
+        let output = closecall(args);
+        assert_eq!(code(&output), 6, "{args:?}");
+        assert!(stderr(&output).contains(stated), "{args:?}: {}", stderr(&output));
+    };
+    let (here, there) = (folder.path().to_str().unwrap(), out.to_str().unwrap());
+    refused(&["replay", here, "0"], "the folder holds no results of a campaign: it has no manifest.json");
+    refused(&["compare", there, here], "the folder holds no results of a campaign");
+    refused(&["explain", headline.to_str().unwrap(), "0"], "it is a file, and the folder of a campaign is needed");
+    refused(&["replay", "no-such-folder", "0"], "failed to read no-such-folder: ");
+    refused(&["baseline", "compare", "baseline.json", there], "it is a folder, and the file of a baseline is needed");
     fs::write(out.join("manifest.json"), "{\"manifest_version\": 1").unwrap();
     let output = closecall(["replay", out.to_str().unwrap(), "0"]);
     assert_eq!(code(&output), 3);
     assert!(stderr(&output).contains("manifest.json"));
+}
+
+#[test]
+fn a_setting_of_an_element_of_a_list_is_applied_and_overrides_a_check_as_a_whole_list_does() {
+    let folder = folder();
+    let run = |settings: &[&str]| {
+        let mut args =
+            vec!["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--paired", "--no-out"];
+        settings.iter().for_each(|setting| args.extend(["--set", setting]));
+        closecall(&args)
+    };
+    let text = stdout(&run(&["checks.MIS-6[0]=max(max_speed_deficit_mps) <= 100"]), 4);
+    assert!(text.contains("OVERRIDDEN") && text.contains("MIS-6: max(max_speed_deficit_mps) <= 10"), "{text}");
+    stdout(&run(&["sensors.additional-rear-cameras=[{name='left',yaw-deg=40}]"]), 0);
+    // A folder keeps the whole list, and a replay gives the same bits.
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let cut_in = ["campaign", "low-thw-overtake", "-n", "2", "--no-gate", "--record", "worst:0", "--out", out];
+    let fault = [
+        "--set",
+        "fault.rear-object=[{dropout=0.5}]",
+        "--set",
+        "fault.rear-object[0].from-s=1",
+        "--set",
+        "sensors.mode=object",
+    ];
+    stdout(&closecall([&cut_in[..], &fault[..]].concat()), 0);
+    let text = stdout(&closecall(["replay", out, "1"]), 0);
+    assert!(text.contains("50 % of the measurements lost from 1.0 s on"), "{text}");
+    let wrong = closecall(["run", "low-thw-overtake", "--set", "fault.rear-object=[{drop-out=0.5}]"]);
+    assert_eq!(code(&wrong), 3);
+    assert!(
+        stderr(&wrong).contains("`fault.rear-object=[{drop-out=0.5}]`: `drop-out`: unknown field"),
+        "{}",
+        stderr(&wrong)
+    );
 }
