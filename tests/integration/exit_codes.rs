@@ -262,8 +262,7 @@ fn a_replay_of_a_missing_sample_or_campaign_is_an_error() {
 fn a_setting_of_an_element_of_a_list_is_applied_and_overrides_a_check_as_a_whole_list_does() {
     let folder = folder();
     let run = |settings: &[&str]| {
-        let mut args =
-            vec!["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--paired", "--no-out"];
+        let mut args = vec!["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--paired"];
         settings.iter().for_each(|setting| args.extend(["--set", setting]));
         closecall(&args)
     };
