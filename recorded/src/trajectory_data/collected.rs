@@ -23,6 +23,7 @@ use super::lane_sides::LaneSides;
 use super::markings::LaneMarkings;
 use super::plain::allowed;
 use super::plane_pieces::{PlaneMoment, PlanePieces};
+use super::plane_steps::PlaneSteps;
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::stated_lanes::StatedLane;
@@ -50,13 +51,6 @@ const LANE_CHANGE_M: f64 = 1.75;
 /// change lanes.
 const MAX_REFERENCES: usize = 20;
 
-/// Least movement that shows a direction (m).
-const LEAST_STEP_M: f64 = 0.3;
-/// Least number of such movements.
-const LEAST_STEPS: usize = 50;
-/// Cosine of the largest angle between a heading and the movement, 30° (-).
-const MOST_TURNED: f64 = 0.866;
-
 /// Number of lane changes within a single step that may have another cause.
 const FEW_JUMPS: usize = 0;
 
@@ -83,6 +77,20 @@ impl Position {
             Self::Road { .. } => true,
             Self::Plane { named_lane, .. } => matches!(named_lane, Some(StatedLane { index: Some(_), .. })),
         }
+    }
+
+    /// Returns `true` if both positions are of one vehicle.
+    fn is_at(self, other: Self) -> bool {
+        let (along_m, across_m) = match (self, other) {
+            (Self::Plane { point: a, .. }, Self::Plane { point: b, .. }) => (a.0 - b.0, a.1 - b.1),
+            (Self::Road { road: a, s_m, d_m, .. }, Self::Road { road: b, s_m: other_s_m, d_m: other_d_m, .. })
+                if a == b =>
+            {
+                (s_m - other_s_m, d_m - other_d_m)
+            }
+            _ => return false,
+        };
+        maths::hypot(along_m, across_m) <= JUMP_ACROSS_M
     }
 }
 
@@ -118,6 +126,8 @@ pub(super) struct Facts {
     /// Lane markings; for positions on roads.
     pub(super) markings: Option<LaneMarkings>,
     pub(super) notes: Vec<String>,
+    /// Why the file is mirrored, unless its caller says that it is.
+    pub(super) mirrored: Option<&'static str>,
     pub(super) unknown_classes: UnknownClasses,
 }
 
@@ -175,17 +185,16 @@ impl Collected {
         let rows: Vec<CollectedRow> = items.iter().filter_map(|item| item.as_ref().ok()).copied().collect();
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by_key(|&index| (rows[index].vehicle, rows[index].time, rows[index].line));
+        let mut doubled = take_doubled(&rows, &mut order, &numbers);
         let period = period(&rows, &order);
-        let road =
-            infer_road((&rows, &order), facts.lane_width_m, facts.clock).map_err(|error| match error.problem {
-                TrajectoryFileProblem::NoRoad { .. } => {
-                    against_headings(&rows, &order).map_or(error, ReadError::of_file)
-                }
-                _ => error,
-            })?;
+        let road = check_steps((&rows, &order), (facts.layout, facts.clock))
+            .and_then(|()| infer_road((&rows, &order), facts.lane_width_m, facts.clock));
+        // Numbers of several vehicles are a reason why the traffic shows no road.
+        let road = road.map_err(|error| doubled.pop_first().map_or(error, |(_, first)| first))?;
         notes.extend(road.iter().flat_map(InferredRoad::warnings));
         let is_in_doubt = road.as_ref().is_some_and(InferredRoad::is_in_doubt);
         let is_mirrored = road.as_ref().is_some_and(InferredRoad::is_mirrored);
+        let mirrored = facts.mirrored.or_else(|| is_mirrored.then_some(MIRRORED));
         let oncoming_side = road.as_ref().and_then(InferredRoad::oncoming_side);
         let names_sides = rows.iter().any(|row| row.position.names_sides());
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
@@ -197,29 +206,30 @@ impl Collected {
             let mut pieces = PlanePieces::default();
             // The piece of the vehicle, and its direction of travel.
             let mut direction: Option<(u64, usize)> = None;
-            let mut before: Option<(Row, u32)> = None;
+            // The row before, its road and its piece.
+            let mut before: Option<(Row, u32, u64)> = None;
             let mut visits = 0;
             for &index in indices {
                 let row = &rows[index];
-                let (place, road_index) = match row.position {
-                    Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road),
+                let (place, road_index, piece) = match row.position {
+                    Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road, 0),
                     Position::Plane { point, heading_rad, named_lane, .. } => {
                         let inferred = road.as_ref();
                         let piece = pieces.number(row.moment((point, heading_rad), facts.clock));
                         let chosen = || Some((piece, inferred?.direction(heading_rad)?));
                         direction = direction.filter(|(before, _)| *before == piece).or_else(chosen);
                         let place = inferred.zip(direction);
-                        (place.and_then(|(road, (_, direction))| road.place(direction, point, named_lane)), 0)
+                        (place.and_then(|(road, (_, direction))| road.place(direction, point, named_lane)), 0, piece)
                     }
                 };
                 let Some(Placed { s_m, d_m, lane }) = place else { continue };
                 let vehicle_id = numbers[row.vehicle as usize];
                 // A vehicle that enters another road, or comes back to a recorded one, begins a track.
-                let begins = |(last, last_road): &(Row, u32)| {
-                    *last_road != road_index || row.time - last.time > period + LONGEST_BRIDGE
+                let begins = |(last, last_road, last_piece): &(Row, u32, u64)| {
+                    (*last_road, *last_piece) != (road_index, piece) || row.time - last.time > period + LONGEST_BRIDGE
                 };
-                if matches!(row.position, Position::Road { .. }) && before.as_ref().is_some_and(begins) {
-                    visits += 1;
+                if before.as_ref().is_some_and(begins) {
+                    visits += u64::from(matches!(row.position, Position::Road { .. }));
                     before = None;
                 }
                 let row = Row {
@@ -240,10 +250,10 @@ impl Collected {
                     marking_distances: MarkingDistances::default(),
                     line: row.line,
                 };
-                if let Some((last, _)) = before.filter(|(last, _)| is_lane_jump(last, &row)) {
+                if let Some((last, ..)) = before.filter(|(last, ..)| is_lane_jump(last, &row)) {
                     jumps.push(LaneJump { index, road: road_index, before: last, row });
                 }
-                before = Some((row, road_index));
+                before = Some((row, road_index, piece));
                 placed[index] = Some(row);
             }
         }
@@ -260,16 +270,19 @@ impl Collected {
                  distances hold, their durations, lateral speeds and lateral accelerations mean nothing"
             ));
         }
-        let mut placed = placed.into_iter();
+        let mut placed = placed.into_iter().enumerate();
         let items = items.into_iter().filter_map(|item| match item {
-            Ok(_) => placed.next().flatten().map(Ok),
+            Ok(_) => {
+                let (index, row) = placed.next()?;
+                doubled.remove(&index).map(Err).or_else(|| row.map(Ok))
+            }
             Err(error) => Some(Err(error)),
         });
         let markings = facts.markings.or_else(|| road.as_ref().map(InferredRoad::markings));
         let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
         let (items, unknown_classes) = (items.collect(), facts.unknown_classes);
         let lane_sides = LaneSides::default();
-        let road = RoadFacts { is_in_doubt, is_mirrored, names_sides, oncoming_side };
+        let road = RoadFacts { is_in_doubt, mirrored, names_sides, oncoming_side };
         Ok(CollectedSource { items, info, notes, road, unknown_classes, lane_sides })
     }
 }
@@ -349,24 +362,44 @@ fn period(rows: &[CollectedRow], order: &[usize]) -> Time {
     Time::from_ns(1_000 * steps_us.iter().sum::<i64>() / steps_us.len().max(1) as i64)
 }
 
-/// Returns a problem if most headings contradict the movements of the vehicles.
-fn against_headings(rows: &[CollectedRow], order: &[usize]) -> Option<TrajectoryFileProblem> {
-    let (mut against, mut all) = (0_usize, 0_usize);
-    for pair in order.windows(2) {
-        let (before, after) = (&rows[pair[0]], &rows[pair[1]]);
-        let (Position::Plane { point: from, .. }, Position::Plane { point: to, heading_rad, .. }) =
-            (before.position, after.position)
-        else {
-            continue;
-        };
-        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-        if before.vehicle == after.vehicle && maths::hypot(dx, dy) >= LEAST_STEP_M {
-            all += 1;
-            against += usize::from(maths::cos(maths::atan2(dy, dx) - heading_rad) < MOST_TURNED);
+/// Checks the steps of vehicles whose positions lie in a plane.
+///
+/// # Errors
+/// Positions contradict headings, speeds or times.
+fn check_steps((rows, order): (&[CollectedRow], &[usize]), (layout, clock): (Layout, Clock)) -> Result<(), ReadError> {
+    let mut steps = PlaneSteps::default();
+    for &index in order {
+        if let Position::Plane { point, heading_rad, .. } = rows[index].position {
+            steps.add(rows[index].moment((point, heading_rad), clock));
         }
     }
-    let percent = 100.0 * against as f64 / all.max(1) as f64;
-    (all >= LEAST_STEPS && 2 * against > all).then_some(TrajectoryFileProblem::HeadingsAgainstMotion { percent })
+    steps.check(layout).map_err(ReadError::of_file)
+}
+
+/// Takes the rows of a vehicle that already has a row at that time out of `order`, which is sorted by vehicle and
+/// time, and returns the problem of each of them by its index.
+fn take_doubled(rows: &[CollectedRow], order: &mut Vec<usize>, numbers: &[u64]) -> BTreeMap<usize, ReadError> {
+    let period = period(rows, order);
+    let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
+    let mut doubled = BTreeMap::new();
+    let mut kept: Option<&CollectedRow> = None;
+    order.retain(|&index| {
+        let row = &rows[index];
+        let before = kept.filter(|kept| (kept.vehicle, kept.time) == (row.vehicle, row.time));
+        let Some(CollectedRow { position, line: first_line, .. }) = before.copied() else {
+            kept = Some(row);
+            return true;
+        };
+        let (vehicle, frame) = (numbers[row.vehicle as usize], steps(row.time - start, period));
+        let problem = if position.is_at(row.position) {
+            TrajectoryFileProblem::DuplicateRow { vehicle, frame, first_line }
+        } else {
+            TrajectoryFileProblem::SharedNumber { vehicle, frame, first_line }
+        };
+        doubled.insert(index, ReadError::new(row.line, problem));
+        false
+    });
+    doubled
 }
 
 /// Infers the road, if positions lie in a plane.
@@ -505,8 +538,8 @@ pub(super) struct CollectedSource {
 #[derive(Clone, Copy, Debug)]
 struct RoadFacts {
     is_in_doubt: bool,
-    /// `true` if lanes with higher indices lie further to the right, and no option says so.
-    is_mirrored: bool,
+    /// Why the file is mirrored, if no option says that it is.
+    mirrored: Option<&'static str>,
     /// `true` if the file states, apart from its positions, which lane is to the left.
     names_sides: bool,
     oncoming_side: Option<Side>,
@@ -529,12 +562,11 @@ impl RowSource for CollectedSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let mirrored = self.road.is_mirrored.then(|| MIRRORED.to_owned());
-        self.notes.iter().cloned().chain(mirrored).collect()
+        self.notes.iter().cloned().chain(self.road.mirrored.map(str::to_owned)).collect()
     }
 
     fn expect_mirrored(&mut self) {
-        self.road.is_mirrored = false;
+        self.road.mirrored = None;
     }
 
     fn names_sides(&self) -> bool {
@@ -550,7 +582,7 @@ impl RowSource for CollectedSource {
     }
 
     fn is_in_doubt(&self) -> bool {
-        self.road.is_in_doubt || self.road.is_mirrored
+        self.road.is_in_doubt || self.road.mirrored.is_some()
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

@@ -22,6 +22,8 @@ use super::fields::{Bounds, FieldError, integer, number};
 use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
 use super::plain::allowed;
+use super::plane_pieces::PlaneMoment;
+use super::plane_steps::PlaneSteps;
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::xml::{Node, Xml};
@@ -52,6 +54,7 @@ pub(super) struct CommonRoadSource<R> {
     obstacle: Option<Obstacle>,
     state: State,
     unknown_classes: UnknownClasses,
+    steps: PlaneSteps,
     is_over: bool,
 }
 
@@ -106,6 +109,7 @@ impl<R: BufRead> CommonRoadSource<R> {
             obstacle: None,
             state: State::default(),
             unknown_classes: UnknownClasses::default(),
+            steps: PlaneSteps::default(),
             is_over: false,
         })
     }
@@ -253,12 +257,15 @@ impl<R: BufRead> CommonRoadSource<R> {
         let Some(position) = roads.locate(road, (x_m, y_m)) else { return Ok(None) };
         let along = maths::cos(heading_rad - position.heading_rad);
         let (number, period) = (obstacle.id, self.step.unwrap_or_default());
+        let (vehicle, time, point, speed_mps) = (number, period * frame, (x_m, y_m), velocity_mps);
+        let moment = PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock: Clock::Continuous };
+        self.steps.add(moment);
         Ok(Some(Row {
             number,
             origin: Time::ZERO,
             vehicle_id: number,
             frame,
-            time: period * frame,
+            time,
             clock: Clock::Continuous,
             s_m: position.s_m,
             d_m: position.d_m,
@@ -329,6 +336,10 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
 
     fn unknown_classes(&self) -> &[UnknownClass] {
         self.unknown_classes.names()
+    }
+
+    fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
+        self.steps.check(Layout::Commonroad).map_err(ReadError::of_file)
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

@@ -482,8 +482,8 @@ pub enum TrajectoryFileProblem {
     /// Vehicles are not between the markings of their carriageway.
     #[error(
         "in {percent:.0} % of the rows of lanes {} to {}, as they are numbered from the left, a vehicle is not between the markings \
-         of its carriageway: the driving directions contradict the markings, as in a file that is mirrored or of traffic that drives on \
-         the left, or the lateral position and the markings have other origins or units",
+         of its carriageway: the file is mirrored, its traffic drives on the left, or the positions and the markings have other origins \
+         or units",
         lanes[0], lanes[1]
     )]
     BesideCarriageway {

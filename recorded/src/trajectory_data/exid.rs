@@ -41,6 +41,7 @@ use super::order::WINDOW_ROWS;
 use super::orientation::{LaneOffset, OffsetSides};
 use super::plain::allowed;
 use super::plane_pieces::{PlaneMoment, PlanePieces};
+use super::plane_steps::PlaneSteps;
 use super::reference_line::Point;
 use super::rows::{Fields, Lines, Separator};
 use super::source::{Clock, FileInfo, ReadError, Row};
@@ -160,6 +161,15 @@ struct PlaneRow {
     named_lane: Option<StatedLane>,
 }
 
+impl PlaneRow {
+    /// Returns the vehicle in the plane.
+    fn moment(&self, frame_rate_hz: f64) -> PlaneMoment {
+        let Self { vehicle, frame, point, heading_rad, speed_mps, .. } = *self;
+        let (time, clock) = (Time::from_s(frame as f64 / frame_rate_hz), Clock::Continuous);
+        PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock }
+    }
+}
+
 /// Turns rows into poses. The rows of a vehicle have to follow one another.
 struct Poses {
     frame_rate_hz: f64,
@@ -174,10 +184,8 @@ impl Poses {
     }
 
     fn of_row(&mut self, row: &PlaneRow) -> Pose {
-        let PlaneRow { point, heading_rad, speed_mps, lane_width_m, offset_m, named_lane, .. } = *row;
-        let time = Time::from_s(row.frame as f64 / self.frame_rate_hz);
-        let (vehicle, clock) = (row.vehicle, Clock::Continuous);
-        let vehicle = self.pieces.number(PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock });
+        let PlaneRow { point, heading_rad, lane_width_m, offset_m, named_lane, .. } = *row;
+        let vehicle = self.pieces.number(row.moment(self.frame_rate_hz));
         // The flag alone is not enough: in some files it is 0 throughout. The offset from the
         // centre of the lane jumps where a vehicle enters the next lane.
         let before_m = self.latest.filter(|(before, _)| *before == vehicle).map(|(_, offset_m)| offset_m);
@@ -227,10 +235,13 @@ impl ExidColumns {
 /// reading of the rows reports them.
 ///
 /// # Errors
-/// Fails if the file cannot be read, no vehicle moves, the vehicles do not follow a road, or a file
-/// of more than [`WINDOW_ROWS`] rows is not sorted by vehicle.
+/// Fails if the file cannot be read, no vehicle moves, positions contradict headings or speeds, the vehicles do
+/// not follow a road, or a file of more than [`WINDOW_ROWS`] rows is not sorted by vehicle.
 pub(super) fn road_from_traffic(path: &Path, frame_rate_hz: f64) -> Result<InferredRoad, TrajectoryFileError> {
-    let road = if is_sorted(path)? {
+    let of_file = |problem| with_path(path, ReadError::of_file(problem));
+    let mut steps = PlaneSteps::default();
+    let road = if is_sorted(path, |row| steps.add(row.moment(frame_rate_hz)))? {
+        steps.check(Layout::Exid).map_err(of_file)?;
         InferredRoad::of(|visit| {
             let mut poses = Poses::new(frame_rate_hz);
             each_plane_row(path, |_, row| {
@@ -240,17 +251,21 @@ pub(super) fn road_from_traffic(path: &Path, frame_rate_hz: f64) -> Result<Infer
         })?
     } else {
         let rows = sorted_rows(path)?;
+        let mut steps = PlaneSteps::default();
+        rows.iter().for_each(|row| steps.add(row.moment(frame_rate_hz)));
+        steps.check(Layout::Exid).map_err(of_file)?;
         InferredRoad::of(|visit| {
             let mut poses = Poses::new(frame_rate_hz);
             rows.iter().for_each(|row| visit(poses.of_row(row)));
             Ok::<(), TrajectoryFileError>(())
         })?
     };
-    road.map_err(|problem| with_path(path, ReadError::of_file(problem)))
+    road.map_err(of_file)
 }
 
-/// Returns true if the rows of each vehicle follow one another in the order of their frames.
-fn is_sorted(path: &Path) -> Result<bool, TrajectoryFileError> {
+/// Returns true if the rows of each vehicle follow one another in the order of their frames. Calls `visit` with
+/// each row.
+fn is_sorted(path: &Path, mut visit: impl FnMut(&PlaneRow)) -> Result<bool, TrajectoryFileError> {
     let mut ended: BTreeSet<u64> = BTreeSet::new();
     let mut latest: Option<(u64, i64)> = None;
     let mut is_sorted = true;
@@ -264,6 +279,7 @@ fn is_sorted(path: &Path) -> Result<bool, TrajectoryFileError> {
             None => {}
         }
         latest = Some((row.vehicle, row.frame));
+        visit(row);
         Ok(())
     })?;
     Ok(is_sorted)

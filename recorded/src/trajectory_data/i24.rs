@@ -7,7 +7,7 @@
 //! - `timestamp`: seconds since 1970. `x_position`: middle of the *rear* along the road (feet);
 //!   `direction` 1 is towards increasing, −1 towards decreasing x. `y_position`: across the road
 //!   (feet); 0 is the left edge of the leftmost lane in either direction, and it has the sign of the
-//!   direction.
+//!   direction. If most positions of a direction have the other sign, it counts the other way.
 //! - `length`, `width` in feet. `coarse_vehicle_class`: 0 sedan, 1 midsize, 2 van, 3 pickup, 4 semi,
 //!   5 truck, 6 motorcycle.
 //! - No lane is stated. Lanes are 12 ft wide, as on US interstates (AASHTO, *A Policy on Design
@@ -67,6 +67,12 @@ impl Size {
     }
 }
 
+/// Returns the lane at a distance to the right of the left edge (m).
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
+fn lane_at(right_m: f64) -> u8 {
+    ((right_m / LANE_M) as u8).saturating_add(1).min(MAX_LANES)
+}
+
 /// One trajectory, as the file states it.
 #[derive(Deserialize)]
 struct Document {
@@ -85,6 +91,8 @@ struct Reader {
     documents: u64,
     error: Option<ReadError>,
     has: [bool; 2],
+    /// Sum of the signs of the lateral positions to the right, of each direction.
+    signs: [f64; 2],
 }
 
 /// Reads a file of I-24 MOTION.
@@ -200,13 +208,13 @@ impl Reader {
                 (along_m[after] - along_m[before], timestamp[after] - timestamp[before])
             });
             let forward_mps = if is_against { mps.abs() } else { mps.max(0.0) };
-            let right_m = FOOT_M * y_position[k].abs();
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
-            let lane = ((right_m / LANE_M) as u8).saturating_add(1).min(MAX_LANES);
+            let right_m = direction * FOOT_M * y_position[k];
+            self.signs[road as usize] += right_m.signum();
             let row = CollectedRow {
                 vehicle,
                 time: Time::from_s(time_s),
-                position: Position::Road { road, s_m: along_m[k], d_m: -right_m, lane },
+                // The sign of the lateral position is known after the last row, and the lane with it.
+                position: Position::Road { road, s_m: along_m[k], d_m: -right_m, lane: 0 },
                 speed_mps: forward_mps.min(allowed::SPEED_MPS.high),
                 acceleration_mps2: None,
                 length_m,
@@ -232,7 +240,10 @@ impl Reader {
         let (shift_m, first_lane) =
             if both { (f64::from(MAX_LANES) * LANE_M + SEPARATION_M, MAX_LANES + 1) } else { (0.0, 0) };
         for row in self.collected.rows_mut() {
-            if let Position::Road { road: 1, d_m, lane, .. } = &mut row.position {
+            let Position::Road { road, d_m, lane, .. } = &mut row.position else { continue };
+            *d_m *= self.signs[*road as usize].signum();
+            *lane = lane_at(-*d_m);
+            if *road == 1 {
                 *d_m -= shift_m;
                 *lane += first_lane;
             }
@@ -250,6 +261,7 @@ impl Reader {
             lane_width_m: None,
             markings: Some(markings),
             notes: vec![lanes.to_owned()],
+            mirrored: None,
             unknown_classes: UnknownClasses::default(),
         })
     }

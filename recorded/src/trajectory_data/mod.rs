@@ -97,6 +97,7 @@ mod osi_messages;
 mod parquet;
 mod plain;
 mod plane_pieces;
+mod plane_steps;
 mod plausible;
 mod quality;
 mod reference_line;

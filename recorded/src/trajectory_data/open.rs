@@ -192,11 +192,15 @@ fn reader_for<'a>(
     mut input: Box<dyn BufRead + 'a>,
     options: &ReadOptions,
 ) -> Result<Box<dyn RowSource + 'a>, ReadError> {
-    let start = input.fill_buf().map_err(|error| ReadError::of_file(io_problem(error)))?;
+    let io = |error| ReadError::of_file(io_problem(error));
+    if input.fill_buf().map_err(io)?.starts_with(BYTE_ORDER_MARK) {
+        input.consume(BYTE_ORDER_MARK.len());
+    }
+    let start = input.fill_buf().map_err(io)?;
     if let Some((_, kind)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
         return Err(ReadError::of_file(TrajectoryFileProblem::Archive { kind }));
     }
-    let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
+    let text = start.trim_ascii_start();
     let is_i24 = [I24].iter().chain(&I24_START).any(|word| text.windows(word.len()).any(|window| window == *word));
     let is_read_json = is_i24 || openlabel::is_openlabel(text);
     if let Some((_, kind)) = FOREIGN.into_iter().find(|(beginning, _)| text.starts_with(beginning) && !is_read_json) {

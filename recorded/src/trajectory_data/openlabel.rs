@@ -447,6 +447,7 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
         }
     }
     Ok(Box::new(collected.into_source(Facts {
+        mirrored: None,
         layout: Layout::OpenLabel,
         clock: clock(&text),
         lane_width_m: None,

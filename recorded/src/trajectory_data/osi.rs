@@ -30,6 +30,8 @@ use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
 use super::osi_messages::{Messages, refused};
 use super::plain::allowed;
+use super::plane_pieces::PlaneMoment;
+use super::plane_steps::PlaneSteps;
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use crate::lane_change::LaneReliability;
@@ -91,7 +93,13 @@ pub(super) fn read<'a, R: BufRead + 'a>(
     let roads = Roads::from_lanelets(&lanelets(&first)?);
     reader.first = Some(first);
     if !roads.is_empty() {
-        return Ok(Box::new(OsiSource { reader, roads, road_of: BTreeMap::new(), rows: VecDeque::new() }));
+        return Ok(Box::new(OsiSource {
+            reader,
+            roads,
+            road_of: BTreeMap::new(),
+            rows: VecDeque::new(),
+            steps: PlaneSteps::default(),
+        }));
     }
     if lanes == LaneReliability::Reliable {
         let place = "the first message has no driving lane with both boundaries".to_owned();
@@ -269,6 +277,7 @@ struct OsiSource<R> {
     /// The road of each vehicle, by its number.
     road_of: BTreeMap<u64, usize>,
     rows: VecDeque<Row>,
+    steps: PlaneSteps,
 }
 
 impl<R: BufRead> RowSource for OsiSource<R> {
@@ -282,6 +291,10 @@ impl<R: BufRead> RowSource for OsiSource<R> {
 
     fn warnings(&self) -> Vec<String> {
         self.reader.notes()
+    }
+
+    fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
+        self.steps.check(Layout::Osi).map_err(ReadError::of_file)
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
@@ -301,6 +314,9 @@ impl<R: BufRead> RowSource for OsiSource<R> {
                     }
                 };
                 let Some(place) = self.roads.locate(road, point) else { continue };
+                let (time, clock) = (vehicle.time, Clock::Continuous);
+                let speed_mps = Observed::along(vehicle.velocity_mps, heading_rad);
+                self.steps.add(PlaneMoment { vehicle: number, time, point, heading_rad, speed_mps, clock });
                 let along = |vector| Observed::along(vector, place.heading_rad);
                 self.rows.push_back(Row {
                     number,
@@ -353,6 +369,7 @@ fn in_plane<'a, R: BufRead + 'a>(mut reader: OsiReader<R>) -> Result<Box<dyn Row
         lane_width_m: None,
         markings: None,
         notes: reader.notes(),
+        mirrored: None,
         unknown_classes: UnknownClasses::default(),
     })?))
 }

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | median length of cars | 2 to 12 m | feet instead of metres and the reverse, swapped length and width |
 //! | median width of cars | 1 to 3 m | the same |
+//! | median speed of moving vehicles | up to 70 m/s | feet instead of metres throughout a file, times that count too fast |
 //! | vehicles whose position falls as they drive | below 5 % | a reversed axis, the other carriageway in the same file |
 //! | vehicles that advance by more than 1.6 times what their recorded speeds make | at most 20 % | a column of zeros |
 //! | median of (distance between two frames) / (speed · time) | 0.6 to 1.6; 0.8 to 1.25 in simulations | km/h, mph or ft/s instead of m/s (3.6, 2.2, 3.3), a wrong frame rate, swapped s and d, traffic that drives backwards |
@@ -24,10 +25,14 @@ use super::source::{ReadError, Row};
 
 /// Minimum speed of a vehicle for its steps to count (m/s). At lower speeds, position noise hides a
 /// wrong unit.
-const MIN_SPEED_MPS: f64 = 5.0;
+pub(super) const MIN_SPEED_MPS: f64 = 5.0;
+
+/// Largest median speed of moving vehicles (m/s): 252 km/h, above all limits of roads that have one, and above
+/// the traffic of roads that have none. An assumption with a plausible range of 60 to 80 m/s.
+const MOST_MEDIAN_MPS: f64 = 70.0;
 
 /// Minimum number of steps between frames for their median to be judged.
-const MIN_STEPS: usize = 10;
+pub(super) const MIN_STEPS: usize = 10;
 
 /// Share of a vehicle's steps that lead backwards above which it drives against the road (-).
 const AGAINST_STEPS: f64 = 0.5;
@@ -75,13 +80,29 @@ pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(
     if steps.len() >= MIN_STEPS {
         check_steps(steps, layout)?;
     }
-    check_speeds(rows, clock)
+    check_speeds(rows, clock)?;
+    let speeds = rows.iter().filter(|row| row.speed_mps > MIN_SPEED_MPS).map(|row| (row.speed_mps, row.line)).collect();
+    let plausible = Plausible {
+        quantity: "the median speed of moving vehicles",
+        unit: "m/s",
+        range: (0.0, MOST_MEDIAN_MPS),
+        allowed: "up to 70 m/s",
+    };
+    check_median(speeds, plausible)
 }
 
 /// Rejects steps of moving vehicles that contradict the recorded speeds.
 fn check_steps(steps: Vec<RoadStep>, layout: Layout) -> Result<(), ReadError> {
     check_direction(&steps)?;
     let ratios: Vec<f64> = steps.into_iter().map(|step| step.ratio).collect();
+    check_ratio(median(ratios), layout).map_err(ReadError::of_file)
+}
+
+/// Rejects a median `ratio` of the distance of a step to the distance that the speed predicts (-).
+///
+/// # Errors
+/// The ratio is implausible for the layout.
+pub(super) fn check_ratio(ratio: f64, layout: Layout) -> Result<(), TrajectoryFileProblem> {
     // A simulation has no noise: km/h and mph, which differ by 1.6, can be told apart.
     let (range, allowed) = match layout {
         Layout::Sumo | Layout::Vissim => ((0.8, 1.25), "0.8 to 1.25"),
@@ -92,11 +113,10 @@ fn check_steps(steps: Vec<RoadStep>, layout: Layout) -> Result<(), ReadError> {
         Layout::Plain | Layout::InCar => "`time_s`, in seconds,",
         _ => "the time between two frames",
     };
-    let ratio = median(ratios);
     if ratio >= range.0 && ratio <= range.1 {
         return Ok(());
     }
-    Err(ReadError::of_file(TrajectoryFileProblem::ImplausibleSteps { ratio, allowed, clock }))
+    Err(TrajectoryFileProblem::ImplausibleSteps { ratio, allowed, clock })
 }
 
 /// Rejects steps that lead backwards: traffic of the other carriageway, or a reversed axis.

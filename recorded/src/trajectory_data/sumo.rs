@@ -240,6 +240,7 @@ impl Reader {
             lane_width_m,
             markings: None,
             notes,
+            mirrored: None,
             unknown_classes: self.unknown_classes,
         })?;
         Ok(source.with_lane_sides(self.lane_sides))

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_traffic::Time;
 
+use super::assemble::step;
 use super::axes::{self, Axes, AxisOptions};
 use super::builder::TrackBuilder;
 use super::class_names::UnknownClass;
@@ -516,45 +517,14 @@ impl<'a> Tracks<'a> {
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         self.period = clock.period;
         let start = start(beginning);
-        let FileInfo { layout, markings: stated, .. } = self.source.info();
+        let stated = self.source.info().markings;
         self.axes = Axes::new(self.axis_options, beginning, stated.as_ref());
         rows.iter_mut().for_each(|row| self.axes.turn(row));
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
-        plausible::check(beginning, layout, clock)?;
-        self.speed_doubt = plausible::doubt(beginning, clock);
-        if self.lanes == LaneReliability::Unreliable
-            && matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25)
-        {
-            self.speed_doubt = self.speed_doubt.take().or_else(|| side_by_side::doubt_of_unit(beginning));
-        }
-        // Other readers derive the lanes from the positions, so that only an option can part them.
-        let states_lanes =
-            matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);
-        if states_lanes || self.axis_options != AxisOptions::default() {
-            axes::check_order(beginning, stated.as_ref(), self.lanes)?;
-        }
-        self.source.check_sides(self.axis_options.mirror_d)?;
-        if self.lanes == LaneReliability::Reliable {
-            self.source.check_lane_sides(self.axis_options.mirror_d)?;
-        }
-        self.sides = Sides::of(beginning, &*self.source, self.axis_options.mirror_d);
-        if states_lanes && self.lanes == LaneReliability::Reliable {
-            let side_by_side = SideBySide::of(beginning);
-            side_by_side.check(layout)?;
-            self.lane_doubt = side_by_side.doubt();
-        }
-        // The other layouts state their units, or derive the lanes from the positions.
-        if layout == Layout::Plain && self.lanes == LaneReliability::Reliable {
-            lane_spacing::check(beginning)?;
-        }
-        if let (Layout::Highd, Some(markings)) = (layout, &stated) {
-            axes::check_carriageways(beginning, markings)?;
-        }
-        if let (Layout::Highd, LaneReliability::Reliable, Some(markings)) = (layout, self.lanes, &stated) {
-            self.axis_warning = axes::check_markings(beginning, markings)?;
-        }
+        let checked = self.check_beginning(beginning, stated.as_ref(), clock);
+        checked.map_err(|error| self.shared_number(beginning, clock).unwrap_or(error))?;
         self.is_simulated = beginning.first().is_some_and(|row| row.clock == Clock::Simulated);
-        self.jumps_to_lanes = self.is_simulated && jump_to_lanes(beginning);
+        self.jumps_to_lanes = self.is_simulated && jump_to_lanes(beginning, clock);
         // The log of one vehicle shows no lanes of a road.
         if self.lanes == LaneReliability::Unreliable && self.source.info().layout != Layout::InCar {
             self.estimated = Some(EstimatedLanes::of(&rows[..rows.len().min(WINDOW_ROWS)]));
@@ -582,6 +552,70 @@ impl<'a> Tracks<'a> {
         let stated = self.estimated_markings().or(self.source.info().markings);
         self.markings = stated.unwrap_or_else(derived);
         Ok(())
+    }
+
+    /// Checks the rows at the beginning of the file, of which it states these markings, and keeps what a reader of
+    /// results has to know.
+    fn check_beginning(
+        &mut self,
+        beginning: &[Row],
+        stated: Option<&LaneMarkings>,
+        clock: FrameClock,
+    ) -> Result<(), ReadError> {
+        let layout = self.source.info().layout;
+        plausible::check(beginning, layout, clock)?;
+        self.speed_doubt = plausible::doubt(beginning, clock);
+        if self.lanes == LaneReliability::Unreliable
+            && matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25)
+        {
+            self.speed_doubt = self.speed_doubt.take().or_else(|| side_by_side::doubt_of_unit(beginning));
+        }
+        // Other readers derive the lanes from the positions, so that only an option can part them.
+        let states_lanes =
+            matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);
+        if states_lanes || self.axis_options != AxisOptions::default() {
+            axes::check_order(beginning, stated, self.lanes)?;
+        }
+        self.source.check_sides(self.axis_options.mirror_d)?;
+        if self.lanes == LaneReliability::Reliable {
+            self.source.check_lane_sides(self.axis_options.mirror_d)?;
+        }
+        self.sides = Sides::of(beginning, &*self.source, self.axis_options.mirror_d);
+        if states_lanes && self.lanes == LaneReliability::Reliable {
+            let side_by_side = SideBySide::of(beginning);
+            side_by_side.check(layout)?;
+            self.lane_doubt = side_by_side.doubt();
+        }
+        // The other layouts state their units, or derive the lanes from the positions.
+        if layout == Layout::Plain && self.lanes == LaneReliability::Reliable {
+            lane_spacing::check(beginning)?;
+        }
+        if let (Layout::Highd | Layout::I24 | Layout::Commonroad | Layout::Osi, Some(markings)) = (layout, stated)
+            && (layout == Layout::Highd || self.lanes == LaneReliability::Reliable)
+        {
+            axes::check_carriageways(beginning, markings)?;
+        }
+        if let (Layout::Highd, LaneReliability::Reliable, Some(markings)) = (layout, self.lanes, stated) {
+            self.axis_warning = axes::check_markings(beginning, markings)?;
+        }
+        if let (Layout::I24 | Layout::Commonroad | Layout::Osi, LaneReliability::Reliable, Some(markings)) =
+            (layout, self.lanes, stated)
+        {
+            self.lane_doubt = axes::doubt_of_placing(beginning, markings);
+        }
+        Ok(())
+    }
+
+    /// Returns the refusal of a number that belongs to several vehicles, if there is one and no row may be left out.
+    /// Such numbers are a reason why rows contradict other checks.
+    fn shared_number(&self, rows: &[Row], clock: FrameClock) -> Option<ReadError> {
+        let mut latest: BTreeMap<(u64, Time, Time), &Row> = BTreeMap::new();
+        let shared = rows.iter().find_map(|row| {
+            let before = latest.insert((row.number, row.origin, row.time), row)?;
+            let error = step(before, row, clock).err()?;
+            matches!(error.problem, TrajectoryFileProblem::SharedNumber { .. }).then_some(error)
+        });
+        shared.filter(|_| self.bad_rows == BadRows::Reject)
     }
 
     /// Returns `error`, or the problem of the whole file that it belongs to, as the further rows show.
@@ -654,12 +688,13 @@ fn of_most_rows(first: ReadError, bad: u64, rows: u64) -> ReadError {
 }
 
 /// Returns true if most changes of the lane take a single step, as in a simulation that does not model the movement.
-fn jump_to_lanes(rows: &[Row]) -> bool {
+fn jump_to_lanes(rows: &[Row], clock: FrameClock) -> bool {
     let mut latest: BTreeMap<u64, &Row> = BTreeMap::new();
     let (mut changes, mut jumps) = (0_u64, 0_u64);
     for row in rows {
         let before = latest.insert(row.number, row);
-        if let Some(before) = before.filter(|before| before.lane != row.lane) {
+        let follows = |before: &&Row| before.lane != row.lane && row.time <= clock.bridged_until(before.time);
+        if let Some(before) = before.filter(follows) {
             changes += 1;
             jumps += u64::from(is_lane_jump(before, row));
         }

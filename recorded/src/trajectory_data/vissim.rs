@@ -16,9 +16,10 @@
 //!   rear in a plane. The road is inferred from the traffic; see `inferred_road`. If `LANE\LINK\NO`
 //!   and `LANE\INDEX` are there as well, they name the lane of the vehicle.
 //! - `LANE\LINK\NO`, `LANE\INDEX`, `POS`: the distance of the front from the start of a link, and a
-//!   lane, counted from the right. `POSLAT` is the position across the lane, from 0 to 1. That it
-//!   grows to the left is an assumption, which lane changes confirm or refute: a vehicle moves
-//!   steadily from lane to lane. Each link is a road of its own: a track ends where its link ends.
+//!   lane, counted from the right. `POSLAT` is the position across the lane, from 0 to 1, and grows
+//!   as the lanes are counted: a vehicle that changes lanes moves steadily. If it jumps, the positions or
+//!   the lanes are counted from the other side, and the file is in doubt. Each link is a road of its
+//!   own: a track ends where its link ends.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -40,6 +41,10 @@ use super::stated_lanes::StatedLane;
 
 /// The start of the header.
 const HEADER: &str = "$VEHICLE:";
+
+/// The doubt about a file whose positions across the lane grow against the numbers of its lanes.
+const AGAINST_LANES: &str = "POSLAT grows against the numbers of the lanes, as the lane changes show: it is read as growing to the right, and the lanes as \
+     counted from the right; if they are counted from the left, left is called right";
 
 const FORMAT: &str = "vehicle record of Vissim (.fzp)";
 
@@ -207,7 +212,9 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
             let reason = format!("it has no header `{HEADER}SIMSEC;NO;…`, as Vissim writes it since version 6");
             return Err(ReadError::of_file(TrajectoryFileProblem::Unreadable { format: FORMAT, reason }));
         };
-        if let Some(names) = line.strip_prefix(HEADER) {
+        let start = line.get(..HEADER.len()).filter(|start| start.eq_ignore_ascii_case(HEADER));
+        if let Some(start) = start {
+            let names = &line[start.len()..];
             let (header, _, width) = Header::parse(names).map_err(|problem| ReadError::new(number, problem))?;
             header.check_no_duplicates().map_err(|problem| ReadError::new(number, problem))?;
             break ((header, number), width);
@@ -361,9 +368,6 @@ impl Reader {
             ));
         }
         let grows_to_the_right = self.steps[1] < self.steps[0];
-        if grows_to_the_right {
-            notes.push("POSLAT grows to the right, as the lane changes show".to_owned());
-        }
         for row in self.collected.rows_mut() {
             if let Position::Road { road, d_m, lane, .. } = &mut row.position
                 && let Some(&LinkRoad { first_lane, shift_m, lanes }) = by_link.get(road)
@@ -381,6 +385,7 @@ impl Reader {
             lane_width_m: None,
             markings,
             notes,
+            mirrored: grows_to_the_right.then_some(AGAINST_LANES),
             unknown_classes: self.unknown_classes,
         })?;
         Ok(source.with_lane_sides(self.lane_sides))

@@ -29,7 +29,7 @@ fn mixed_up_units_and_columns_are_detected() {
     const FEET_PER_M: f64 = 1.0 / 0.3048;
     assert!(read_text(drive(|_| {}).as_bytes()).is_ok());
     let steps = ["the median distance between two frames", "units or columns", "`time_s`, in seconds, wrong"];
-    let cases: [(&str, String, &[&str]); 10] = [
+    let cases: [(&str, String, &[&str]); 11] = [
         ("times in milliseconds", drive(|at| at[0] *= 1_000.0), &steps),
         ("km/h", drive(|at| at[3] *= 3.6), &steps),
         ("mph", drive(|at| at[3] *= 2.237), &steps),
@@ -42,6 +42,11 @@ fn mixed_up_units_and_columns_are_detected() {
             "sizes in feet",
             drive(|at| at.iter_mut().skip(4).for_each(|m| *m *= FEET_PER_M)),
             &["the median length of cars", "15.092 m", "2 to 12 m"],
+        ),
+        (
+            "feet throughout, with sizes of a list",
+            drive(|at| at[1..4].iter_mut().for_each(|value| *value *= FEET_PER_M)),
+            &["the median speed of moving vehicles", "82.021 m/s", "up to 70 m/s"],
         ),
         ("length and width swapped", drive(|at| at.swap(4, 5)), &["the median length of cars"]),
     ];

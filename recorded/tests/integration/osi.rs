@@ -169,6 +169,48 @@ fn a_trace_with_lanes_is_read_with_them() {
 }
 
 #[test]
+fn a_number_of_vehicles_on_both_sides_of_a_road_is_the_reason_why_they_are_not_in_its_lanes() {
+    let mut messages = messages(Some(lanes(true)));
+    for object in
+        messages.iter_mut().flat_map(|message| &mut message.moving_object).filter(|object| object.base.is_some())
+    {
+        let number = object.id.as_ref().and_then(|id| id.value).unwrap();
+        object.id = id(number % 12);
+        let position = object.base.as_mut().and_then(|base| base.position.as_mut()).unwrap();
+        position.y = position.y.map(|y_m| if number >= 12 { y_m + 60.0 } else { y_m });
+    }
+    let problem = read("run.osi", &trace(&messages), LaneReliability::Reliable).unwrap_err().problem;
+    assert!(matches!(problem, TrajectoryFileProblem::SharedNumber { vehicle: 0, .. }), "{problem}");
+}
+
+#[test]
+fn vehicles_beside_the_middles_of_the_lanes_and_headings_of_other_axes_are_not_read_without_a_word() {
+    let read_with = |edit: &dyn Fn(&mut BaseMoving)| {
+        let mut messages = messages(Some(lanes(true)));
+        let vehicles = messages.iter_mut().flat_map(|message| &mut message.moving_object);
+        vehicles.filter_map(|object| object.base.as_mut()).for_each(edit);
+        read("run.osi", &trace(&messages), LaneReliability::Reliable)
+    };
+    let shifted = |left_m: f64| {
+        let data = read_with(&|base| {
+            let position = base.position.as_mut().unwrap();
+            position.y = position.y.map(|y_m| y_m + left_m);
+        });
+        let data = data.unwrap();
+        assert_eq!(data.is_in_doubt, data.doubts_lanes);
+        data.notes.into_iter().find(|note| note.contains("count from elsewhere"))
+    };
+    assert_eq!(shifted(0.5), None);
+    assert!(shifted(1.5).unwrap().contains("1.5 m to the left of the middles"));
+    assert!(shifted(-LANE_M).unwrap().contains("beside the lanes"));
+    let turned = read_with(&|base| {
+        base.orientation.as_mut().unwrap().yaw = Some(0.6);
+    });
+    let problem = turned.unwrap_err().problem;
+    assert!(matches!(problem, TrajectoryFileProblem::HeadingsAgainstMotion { .. }), "{problem}");
+}
+
+#[test]
 fn a_trace_without_lanes_is_read_if_they_are_to_be_estimated() {
     let bytes = trace(&messages(None));
     let error = read("run.osi", &bytes, LaneReliability::Reliable).unwrap_err();

@@ -376,6 +376,44 @@ fn headings_in_other_axes_than_the_positions_are_refused_by_that_reason() {
         &["than its heading states", "different axes"],
         "headings",
     );
+    // One heading for both carriageways.
+    let text = unnamed_road(true, false).replace("angle=\"270\"", "angle=\"90\"");
+    assert_mentions(
+        &read_text(text.as_bytes()).unwrap_err(),
+        &["in 47 % of the steps", "different axes"],
+        "one heading",
+    );
+}
+
+#[test]
+fn speeds_and_times_in_other_units_are_the_reason_why_traffic_in_a_plane_does_not_seem_to_move() {
+    let of_speed = |drive: &Drive| {
+        (format!("speed=\"{:.2}\"", drive.speed_mps), format!("speed=\"{:.2}\"", 3.6 * drive.speed_mps))
+    };
+    let in_kmh = DRIVES.iter().map(of_speed).fold(sumo_xml(false), |text, (mps, kmh)| text.replace(&mps, &kmh));
+    assert_mentions(&read_text(in_kmh.as_bytes()).unwrap_err(), &["is 0.278", "0.8 to 1.25"], "km/h");
+    let columns = sumo_table(";", true);
+    let (header, rows) = columns.split_once('\n').unwrap();
+    let in_ms = rows.lines().map(|line| {
+        let (time, rest) = line.split_once(';').unwrap();
+        format!("{:.0};{rest}\n", 1_000.0 * time.parse::<f64>().unwrap())
+    });
+    let in_ms = format!("{header}\n{}", in_ms.collect::<String>());
+    assert_mentions(&read_text(in_ms.as_bytes()).unwrap_err(), &["is 0.001", "time between two frames"], "ms");
+}
+
+#[test]
+fn headings_of_exid_in_other_axes_are_refused_by_that_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    exid(folder.path(), &[], true);
+    let path = folder.path().join("05_tracks.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace(",0.0,1.9,4.7,", ",90.0,1.9,4.7,")).unwrap();
+    assert_mentions(
+        &read(folder.path()).unwrap_err(),
+        &["05_tracks.csv", "100 % of the steps", "different axes"],
+        "north",
+    );
 }
 
 /// Three lanes without names, in which vehicle 2 changes to the left, and, if `is_two_way`, oncoming traffic
@@ -507,8 +545,10 @@ fn vissim_by_coordinates() -> String {
 
 #[test]
 fn vehicle_records_of_vissim_are_read_by_links_and_by_coordinates() {
-    for text in [vissim_by_link(), vissim_across(|across| 1.0 - across), vissim_by_coordinates()] {
+    let in_small_letters = vissim_by_link().replace("$VEHICLE:SIMSEC;NO", "$vehicle:simsec;no");
+    for text in [vissim_by_link(), in_small_letters, vissim_by_coordinates()] {
         let data = read_text(text.as_bytes()).unwrap();
+        assert!(!data.is_in_doubt, "{:?}", data.notes);
         assert_eq!((data.layout, data.period), (Layout::Vissim, Time::from_ms(100)));
         assert_eq!(
             first_and_last_lanes(&data),
@@ -520,6 +560,58 @@ fn vehicle_records_of_vissim_are_read_by_links_and_by_coordinates() {
         let crossing_s = assert_one_lane_change(&data);
         assert!((crossing_s - 6.0).abs() < 0.2, "{crossing_s}");
     }
+}
+
+#[test]
+fn lanes_of_vissim_against_the_positions_across_them_are_in_doubt_because_either_may_be_turned() {
+    let text = vissim_across(|across| 1.0 - across);
+    let data = read_text(text.as_bytes()).unwrap();
+    assert!(
+        data.is_in_doubt && data.notes.iter().any(|note| note.contains("POSLAT grows against")),
+        "{:?}",
+        data.notes
+    );
+    assert!((assert_one_lane_change(&data) - 6.0).abs() < 0.2, "positions across the lane are turned");
+    // A file that counts its lanes from the left.
+    let axes = AxisOptions { mirror_d: true, lanes_from_right: true, ..AxisOptions::default() };
+    let options = ReadOptions { axes, ..ReadOptions::default() };
+    let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
+    let data = tracks.and_then(|tracks| tracks.collect_all()).unwrap();
+    let changes = detect(&smooth(&data));
+    let sides: Vec<Side> = changes.iter().map(|change| change.direction).collect();
+    assert!(!data.is_in_doubt && sides == [Side::Right], "{sides:?}: {:?}", data.notes);
+}
+
+#[test]
+fn a_name_of_several_vehicles_at_one_time_is_refused_by_that_reason() {
+    // Two vehicles of a file with the name of one: beside each other, and on two links.
+    let sumo = sumo_xml(false).replace("id=\"f.2\"", "id=\"f.0\"");
+    let other_link = |line: &str| match line.split_once(";4;7;") {
+        Some((time, rest)) => format!("{time};1;8;{rest}\n"),
+        None => line.to_owned() + "\n",
+    };
+    let vissim: String = vissim_by_link().lines().map(other_link).collect();
+    for text in [sumo, vissim] {
+        let problem = read_text(text.as_bytes()).unwrap_err().problem;
+        assert!(matches!(problem, TrajectoryFileProblem::SharedNumber { vehicle: 1, frame: 0, .. }), "{problem}");
+    }
+}
+
+#[test]
+fn the_same_names_in_a_second_simulation_of_a_file_are_other_vehicles_without_lane_changes_of_a_single_step() {
+    let first = sumo_xml(false);
+    let (_, second) = first.split_once("<fcd-export>\n").unwrap();
+    let later = |line: &str| match line.split('"').collect::<Vec<&str>>()[..] {
+        ["<timestep time=", time_s, end] => {
+            format!("<timestep time=\"{:.2}\"{end}\n", time_s.parse::<f64>().unwrap() + 60.0)
+        }
+        _ => line.to_owned() + "\n",
+    };
+    let second: String = second.lines().map(later).collect();
+    let data = read_text(first.replace("</fcd-export>\n", &second).as_bytes()).unwrap();
+    let has_single_steps = data.notes.iter().any(|note| note.contains("a single step"));
+    assert!(!has_single_steps && data.trajectories.len() == 8, "{:?}", data.notes);
+    assert_eq!(detect(&smooth(&data)).len(), 2);
 }
 
 #[test]
@@ -648,7 +740,8 @@ fn i24(is_array: bool) -> String {
 
 #[test]
 fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
-    for text in [i24(true), i24(false)] {
+    let with_mark = "\u{feff}".to_owned() + &i24(true);
+    for text in [i24(true), i24(false), with_mark] {
         let data = read_text(text.as_bytes()).unwrap();
         assert_eq!((data.layout, data.period, data.trajectories.len()), (Layout::I24, Time::from_ms(40), 20));
         let track = &data.trajectories[4];
@@ -666,6 +759,40 @@ fn trajectories_of_i24_motion_are_read_in_feet_and_in_both_directions() {
             [(5, Side::Right)]
         );
     }
+}
+
+/// Returns a file of the eastbound direction with 20 vehicles, whose lateral positions (ft) are edited.
+fn eastbound_i24(edit: impl Fn(f64) -> f64) -> String {
+    let mut documents: serde_json::Value = serde_json::from_str(&i24(true)).unwrap();
+    for document in documents.as_array_mut().unwrap() {
+        if document["direction"].as_f64() == Some(-1.0) {
+            document["direction"] = 1.into();
+            for x in document["x_position"].as_array_mut().unwrap() {
+                *x = (620_000.0 - x.as_f64().unwrap()).into();
+            }
+        }
+        for y in document["y_position"].as_array_mut().unwrap() {
+            *y = edit(y.as_f64().unwrap().abs()).into();
+        }
+    }
+    documents.to_string()
+}
+
+#[test]
+fn lateral_positions_of_i24_motion_that_count_from_elsewhere_are_in_doubt_or_refused() {
+    let doubt = |edit: fn(f64) -> f64| {
+        let data = read_text(eastbound_i24(edit).as_bytes()).unwrap();
+        assert_eq!(data.is_in_doubt, data.doubts_lanes);
+        data.notes.into_iter().find(|note| note.contains("count from elsewhere"))
+    };
+    assert_eq!(doubt(|y| y), None);
+    assert_eq!(doubt(|y| -y), None, "all positions have the other sign");
+    assert_eq!(doubt(|y| y + 2.0), None);
+    assert!(doubt(|y| y + 5.0).unwrap().contains("1.5 m to the right of the middles"));
+    assert!(doubt(|y| y - 5.0).unwrap().contains("1.5 m to the left of the middles"));
+    assert!(doubt(|y| y - 10.0).unwrap().contains("beside the lanes"));
+    let problem = read_text(eastbound_i24(|y| y - 14.0).as_bytes()).unwrap_err().problem;
+    assert!(matches!(problem, TrajectoryFileProblem::BesideCarriageway { .. }), "{problem}");
 }
 
 #[test]

@@ -1,0 +1,83 @@
+//! What the steps of vehicles in a plane say of their headings, their speeds and the time, before a road is
+//! derived from them.
+//!
+//! ```text
+//!   ■─▶ ■─▶ ■─▶ ■─▶     heading and movement agree: 1 step in 1
+//!   ■─▶      ■─▶        and the distance is speed · time
+//! ```
+//!
+//! A road is derived or chosen by the headings, and the paths of vehicles are split by their speeds. If one of
+//! them is wrong, every step is one that no vehicle makes, the traffic seems not to move, or it is on the road of
+//! the other direction.
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::maths;
+use closecall_traffic::statistics::quantiles::median;
+
+use super::error::TrajectoryFileProblem;
+use super::file_layout::Layout;
+use super::plane_pieces::PlaneMoment;
+use super::plausible::{MIN_SPEED_MPS, MIN_STEPS, check_ratio};
+
+/// Number of steps that are judged.
+const ENOUGH: usize = 200_000;
+/// Least movement that shows a direction (m).
+const LEAST_STEP_M: f64 = 0.3;
+/// Least number of such movements.
+const LEAST_STEPS: usize = 50;
+/// Cosine of the largest angle between a heading and the movement, 30° (-).
+const MOST_TURNED: f64 = 0.866;
+/// Share of the movements that contradict the headings above which a file is refused (-). Headings that are the
+/// same for both carriageways contradict half of them; numbers that jump from vehicle to vehicle contradict
+/// single ones. An assumption with a plausible range of 0.05 to 0.4.
+const CONTRADICTED: f64 = 0.2;
+
+/// The steps of vehicles between two rows.
+#[derive(Debug, Default)]
+pub(super) struct PlaneSteps {
+    latest: BTreeMap<u64, PlaneMoment>,
+    movements: usize,
+    against: usize,
+    /// Distance of each step as a share of the distance that the speed predicts (-).
+    ratios: Vec<f64>,
+}
+
+impl PlaneSteps {
+    /// Adds a row. The rows of each vehicle have to be in the order of their times.
+    pub(super) fn add(&mut self, row: PlaneMoment) {
+        if self.movements >= ENOUGH {
+            return;
+        }
+        // A second row of a frame is refused by that reason later.
+        if self.latest.get(&row.vehicle).is_some_and(|before| before.time == row.time) {
+            return;
+        }
+        let Some(before) = self.latest.insert(row.vehicle, row) else { return };
+        let (dx, dy) = (row.point.0 - before.point.0, row.point.1 - before.point.1);
+        let (moved_m, step_s) = (maths::hypot(dx, dy), (row.time - before.time).s());
+        let speed_mps = 0.5 * (before.speed_mps + row.speed_mps);
+        if speed_mps > MIN_SPEED_MPS && step_s > 0.0 && self.ratios.len() < ENOUGH {
+            self.ratios.push(moved_m / (speed_mps * step_s));
+        }
+        if moved_m >= LEAST_STEP_M {
+            self.movements += 1;
+            self.against += usize::from(maths::cos(maths::atan2(dy, dx) - row.heading_rad) < MOST_TURNED);
+        }
+    }
+
+    /// Checks the steps so far.
+    ///
+    /// # Errors
+    /// The positions contradict the speeds and times, or the headings.
+    pub(super) fn check(&self, layout: Layout) -> Result<(), TrajectoryFileProblem> {
+        if self.ratios.len() >= MIN_STEPS {
+            check_ratio(median(self.ratios.clone()), layout)?;
+        }
+        let share = self.against as f64 / self.movements.max(1) as f64;
+        if self.movements >= LEAST_STEPS && share > CONTRADICTED {
+            return Err(TrajectoryFileProblem::HeadingsAgainstMotion { percent: 100.0 * share });
+        }
+        Ok(())
+    }
+}
