@@ -176,7 +176,7 @@ fn a_gate_that_no_sample_can_miss_is_refused_wherever_it_stands() {
         assert_eq!(code(&of_project), 3, "{gate}: {}", stderr(&of_project));
         assert!(message(&of_project).contains(part), "{gate}: {}", message(&of_project));
         let path = without_checks(folder.path(), &format!("[gate]\nrequire = ['{gate}']\n\n"));
-        let of_file = closecall(["campaign", path.to_str().unwrap(), "--no-out"]);
+        let of_file = closecall(["campaign", path.to_str().unwrap()]);
         assert_eq!(code(&of_file), 3, "{gate}: {}", stderr(&of_file));
         assert!(message(&of_file).contains(part), "{gate}: {}", message(&of_file));
     }
