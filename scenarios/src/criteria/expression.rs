@@ -247,10 +247,15 @@ impl Expression {
     }
 
     /// Returns true if `samples` samples cannot miss the gate, whatever happens in them: it allows a
-    /// count as large as their number. Bounds that no number of samples can miss are refused when
-    /// the gate is read.
+    /// count as large as their number, or a sum as large as theirs. Bounds that no number of samples
+    /// can miss are refused when the gate is read.
     pub fn holds_always(&self, samples: u64) -> bool {
-        self.aggregate == Aggregate::Count && self.operator == Operator::AtMost && self.bound >= samples as f64
+        let largest = match (self.aggregate, self.quantity.measure()) {
+            (Aggregate::Count, _) => 1.0,
+            (Aggregate::Sum, Some((measure, _))) => measure.range.high(),
+            _ => return false,
+        };
+        self.operator == Operator::AtMost && self.bound >= largest * samples as f64
     }
 
     /// Returns the range of the value that is bounded; `None` for a number without range.
@@ -629,11 +634,13 @@ mod tests {
     }
 
     #[test]
-    fn a_count_as_large_as_the_number_of_samples_is_always_met() {
+    fn a_count_or_a_sum_as_large_as_the_samples_can_have_is_always_met() {
         let holds_always = |text: &str| text.parse::<Expression>().unwrap().holds_always(200);
         assert!(holds_always("count(ego_collided) <= 200") && holds_always("count(ego_collided | engaged) <= 1e9"));
         assert!(!holds_always("count(ego_collided) <= 199") && !holds_always("count(engaged) >= 200"));
         assert!(!holds_always("share(ego_collided) <= 0.999"));
+        assert!(holds_always("sum(max_jerk_mps3) <= 8000") && holds_always("sum(harm) <= 1e300"));
+        assert!(!holds_always("sum(max_jerk_mps3) <= 7999") && !holds_always("sum(harm) <= 5"));
     }
 
     #[test]
