@@ -240,7 +240,7 @@ impl Campaign {
             if samples.is_empty() {
                 continue;
             }
-            self.run_samples((number, work), samples.into_iter(), |finished| {
+            self.run_samples(number, work, samples.into_iter(), |finished| {
                 // Without its line, the sample runs again if the campaign is interrupted.
                 match file.as_mut().map_or(Ok(()), |file| file.append(&finished)) {
                     Err(_) if self.goes_on_without_folder => file = None,
@@ -414,7 +414,7 @@ impl Campaign {
             let samples = work.samples(self.partition).skip(done).filter(|sample| !waiting.contains(sample));
             let key = |sample| SampleKey { work: number, sample };
             let mut has_ended = false;
-            self.run_samples((number, work), samples, |finished: Finished| {
+            self.run_samples(number, work, samples, |finished: Finished| {
                 while let Some(turn) = turns.next_if(|turn| *turn != finished.record.sample) {
                     has_ended = passing.pass_waiting(key(turn), ahead)?;
                     if has_ended {
@@ -439,7 +439,8 @@ impl Campaign {
     /// See [`Workers::run`].
     pub(super) fn run_samples(
         &self,
-        (number, work): (usize, &Arc<Work>),
+        number: usize,
+        work: &Arc<Work>,
         mut samples: impl Iterator<Item = u64>,
         mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, CampaignError>,
     ) -> Result<(), CampaignError> {

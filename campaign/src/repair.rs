@@ -171,7 +171,7 @@ fn run_again(campaign: &Campaign, redos: &[Redo]) -> Result<BTreeMap<Key, Finish
     for (index, work) in campaign.works.iter().enumerate() {
         let keys = redos.iter().flat_map(|redo| &redo.samples).filter(|(work, _)| *work == index);
         let samples: Vec<u64> = keys.map(|(_, sample)| *sample).collect();
-        campaign.run_samples((index, work), samples.into_iter(), |finished| {
+        campaign.run_samples(index, work, samples.into_iter(), |finished| {
             results.insert((index, finished.record.sample), finished);
             Ok(ControlFlow::Continue(()))
         })?;

@@ -73,7 +73,7 @@ fn the_same_picture_gives_the_same_bytes_and_the_same_detections() {
 
 /// A vehicle at constant speed that changes from the right lane to the left one between 2 and 7 s
 /// if `changes`.
-fn vehicle(id: u64, class: VehicleClass, (start_m, speed_mps): (f64, f64), changes: bool) -> Trajectory {
+fn vehicle(id: u64, class: VehicleClass, start_m: f64, speed_mps: f64, changes: bool) -> Trajectory {
     let point = |k: i64| {
         let time_s = 0.1 * k as f64;
         let share = ((time_s - 2.0) / 5.0).clamp(0.0, 1.0);
@@ -97,9 +97,9 @@ fn vehicle(id: u64, class: VehicleClass, (start_m, speed_mps): (f64, f64), chang
 
 #[test]
 fn a_flight_follows_all_vehicles_and_the_correction_removes_the_bias_of_trucks() {
-    let car = vehicle(1, VehicleClass::Car, (0.0, 28.0), true);
-    let truck = vehicle(2, VehicleClass::Truck, (45.0, 24.0), true);
-    let lead = vehicle(3, VehicleClass::Car, (-40.0, 26.0), false);
+    let car = vehicle(1, VehicleClass::Car, 0.0, 28.0, true);
+    let truck = vehicle(2, VehicleClass::Truck, 45.0, 24.0, true);
+    let lead = vehicle(3, VehicleClass::Car, -40.0, 26.0, false);
     let data = TrajectoryData::new("own", Time::from_ms(100), vec![car, truck, lead]);
     let flight =
         fly(&data, &FlightOptions { offset_sigma_m: 0.0, ..FlightOptions::default() }, &Backend::Tract).unwrap();
@@ -118,7 +118,7 @@ fn a_flight_follows_all_vehicles_and_the_correction_removes_the_bias_of_trucks()
 
 #[test]
 fn with_exact_boxes_the_silhouette_places_trucks_of_any_height_and_the_height_of_the_class_does_not() {
-    let truck = vehicle(2, VehicleClass::Truck, (0.0, 22.0), true);
+    let truck = vehicle(2, VehicleClass::Truck, 0.0, 22.0, true);
     let data = TrajectoryData::new("own", Time::from_ms(100), vec![truck]);
     // The seed chooses the body: boxes of 4 m, and lower coaches, tankers and platforms.
     let bias_m = |correction, seed| {
@@ -138,7 +138,7 @@ fn with_exact_boxes_the_silhouette_places_trucks_of_any_height_and_the_height_of
 
 #[test]
 fn wrong_options_and_empty_traffic_are_refused() {
-    let data = TrajectoryData::new("own", Time::from_ms(100), vec![vehicle(1, VehicleClass::Car, (0.0, 30.0), false)]);
+    let data = TrajectoryData::new("own", Time::from_ms(100), vec![vehicle(1, VehicleClass::Car, 0.0, 30.0, false)]);
     for (options, words) in [
         (
             FlightOptions { altitude_m: 5.0, ..FlightOptions::default() },

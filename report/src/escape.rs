@@ -21,7 +21,7 @@ pub(crate) fn in_markdown(text: &str) -> String {
             continue;
         }
         let before = index.checked_sub(1).map(|before| text[before]);
-        push_character(c, (before, &text[index + 1..]), &mut escaped);
+        push_character(c, before, &text[index + 1..], &mut escaped);
         index += 1;
     }
     escaped
@@ -67,7 +67,7 @@ fn code_span(text: &[char], start: usize, escaped: &mut String) -> usize {
 }
 
 /// Appends a character between its neighbours.
-fn push_character(c: char, (before, after): (Option<char>, &[char]), escaped: &mut String) {
+fn push_character(c: char, before: Option<char>, after: &[char], escaped: &mut String) {
     let next = after.first().copied();
     let is_blank = |neighbour: Option<char>| neighbour.is_none_or(char::is_whitespace);
     let is_word = |neighbour: Option<char>| neighbour.is_some_and(char::is_alphanumeric);

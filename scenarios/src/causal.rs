@@ -222,7 +222,8 @@ impl CausalSentence<'_> {
 /// of the sensors. `goal_s` is the front time headway that the MIS of the arm is to gain (s).
 pub fn causal_sentence(
     scenario: &Scenario,
-    (sensors, goal_s): (Option<SensorMode>, Option<f64>),
+    sensors: Option<SensorMode>,
+    goal_s: Option<f64>,
     outcome: &Outcome,
 ) -> String {
     let faults = sensors.map_or(scenario.sensors, |mode| scenario.sensors.with_mode(mode)).stated_faults();

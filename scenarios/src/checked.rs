@@ -83,7 +83,7 @@ impl Check for ScenarioConfig {
         let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
         let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
         let duration = Time::from_s(duration_s);
-        let mut actors = self.check_actors(&road, (environment.friction, duration), parameters)?;
+        let mut actors = self.check_actors(&road, environment.friction, duration, parameters)?;
         let ego = only_ego(&actors)?;
         for (index, traffic) in self.traffic.iter().enumerate() {
             traffic::add(traffic, &mut actors, ego, &road, parameters)
@@ -92,7 +92,7 @@ impl Check for ScenarioConfig {
         let interventions = Interventions::check(&self.ideal, &self.fault, parameters)?;
         interventions.apply(&mut actors, ego);
         let sensors = self.sensors.check(parameters).map_err(|error| error.within("sensors"))?;
-        inert_fault::refuse(&self.fault, (&sensors, &road, &environment), duration_s, parameters)?;
+        inert_fault::refuse(&self.fault, &sensors, &road, &environment, duration_s, parameters)?;
         let sensors = sensors.altered(interventions.sensors);
         sensors.check_mounting().map_err(|error| error.within("sensors"))?;
         Ok(Scenario {
@@ -226,7 +226,8 @@ impl ScenarioConfig {
     fn check_actors(
         &self,
         road: &Road,
-        (friction, duration): (f64, Time),
+        friction: f64,
+        duration: Time,
         parameters: &Parameters,
     ) -> Result<Vec<Actor>, ConfigError> {
         let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
@@ -263,7 +264,7 @@ impl ScenarioConfig {
                 let lane = road.lane_at(states[index].d_m);
                 event
                     .then
-                    .check_lane_change((&actor.driver, lane), road)
+                    .check_lane_change(&actor.driver, lane, road)
                     .map_err(|error| locate(error.within("then")))?;
                 events.push(event);
             }

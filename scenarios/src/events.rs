@@ -273,11 +273,7 @@ impl Effect {
 
     /// Checks that an actor with this driver, which starts in lane `start` of `road`, can change
     /// lanes.
-    pub(super) fn check_lane_change(
-        self,
-        (driver, start): (&DriverConfig, Lane),
-        road: &Road,
-    ) -> Result<(), ConfigError> {
+    pub(super) fn check_lane_change(self, driver: &DriverConfig, start: Lane, road: &Road) -> Result<(), ConfigError> {
         let Self::LaneChange { to, .. } = self else { return Ok(()) };
         let refuse = |other, rule: String| Err(ConfigError::new("lane-change", Problem::Contradiction { other, rule }));
         if !matches!(driver, DriverConfig::Wiedemann99(_) | DriverConfig::Idm(_)) {

@@ -24,18 +24,20 @@ const NOT_USED: &str = "a camera whose pipeline is off is not used";
 /// [`ScenarioFile::check_faults_in`](crate::ScenarioFile::check_faults_in).
 pub(super) fn refuse(
     fault: &FaultConfig,
-    (sensors, road, environment): (&Sensors, &Road, &Environment),
+    sensors: &Sensors,
+    road: &Road,
+    environment: &Environment,
     duration_s: f64,
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     refuse_absent(fault, sensors)?;
     refuse_of_cameras(fault, sensors)?;
-    refuse_glare(fault, (sensors, road, environment))?;
+    refuse_glare(fault, sensors, road, environment)?;
     let model = sensors.full_model();
     let rear_lidars: Vec<Lidar> = model.rear_lidars().collect();
-    refuse_of_lidars(("rear-lidar", &fault.rear_lidar), &rear_lidars, road, parameters)?;
+    refuse_of_lidars("rear-lidar", &fault.rear_lidar, &rear_lidars, road, parameters)?;
     if let Some(front_lidar) = model.front_lidar {
-        refuse_of_lidars(("front-lidar", &fault.front_lidar), &[front_lidar], road, parameters)?;
+        refuse_of_lidars("front-lidar", &fault.front_lidar, &[front_lidar], road, parameters)?;
     }
     let refuse_late = |key, starts: &mut dyn Iterator<Item = &Option<Num>>| {
         for (index, from) in starts.enumerate() {
@@ -57,7 +59,7 @@ pub(super) fn refuse(
     refuse_of_objects(fault, sensors, parameters)?;
     refuse_of_radars(fault, sensors, parameters)?;
     match &fault.odometry {
-        Some(odometry) => refuse_of_map(odometry, (sensors, road), duration_s, parameters),
+        Some(odometry) => refuse_of_map(odometry, sensors, road, duration_s, parameters),
         None => Ok(()),
     }
 }
@@ -65,7 +67,8 @@ pub(super) fn refuse(
 /// Refuses names that no LiDAR has, blocked sectors outside of the field of view of a LiDAR, and
 /// mirror images without guard rails.
 fn refuse_of_lidars(
-    (sensor, entries): (&str, &[LidarFaultConfig]),
+    sensor: &str,
+    entries: &[LidarFaultConfig],
     lidars: &[Lidar],
     road: &Road,
     parameters: &Parameters,
@@ -124,7 +127,9 @@ fn refuse_of_cameras(fault: &FaultConfig, sensors: &Sensors) -> Result<(), Confi
 /// Refuses an entry whose only effect is glare of a source that does not shine into the camera.
 fn refuse_glare(
     fault: &FaultConfig,
-    (sensors, road, environment): (&Sensors, &Road, &Environment),
+    sensors: &Sensors,
+    road: &Road,
+    environment: &Environment,
 ) -> Result<(), ConfigError> {
     let is_day = environment.light == Light::Day;
     for (index, entry) in fault.rear_camera.iter().enumerate() {

@@ -58,7 +58,8 @@ pub(super) fn refuse_of_radars(
 /// that make a road which the models do not cover, and missing guard rails on a road without any.
 pub(super) fn refuse_of_map(
     odometry: &OdometryErrorConfig,
-    (sensors, road): (&Sensors, &Road),
+    sensors: &Sensors,
+    road: &Road,
     duration_s: f64,
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {

@@ -83,7 +83,8 @@ pub fn actor_name(index: usize, vehicle: &Trajectory) -> String {
 pub fn reenact(
     encounter: &RecordedEncounter,
     rear: RearDriver,
-    (source, settings): (&Path, &[Setting]),
+    source: &Path,
+    settings: &[Setting],
 ) -> Result<ScenarioFile, ScenarioError> {
     written(config(encounter, rear), (source, settings))
 }

@@ -228,7 +228,7 @@ fn built(
     driver: &Wiedemann99Config,
 ) -> Result<ScenarioConfig, String> {
     let changer = encounter.rear();
-    let own = recorded_actor(encounter, (LANE_CHANGER, changer), DriverConfig::Wiedemann99(driver.clone()))?;
+    let own = recorded_actor(encounter, LANE_CHANGER, changer, DriverConfig::Wiedemann99(driver.clone()))?;
     let mut actors = vec![own];
     let opp1 = encounter.overtaken_index();
     let opp2 = opp2_of(encounter);
@@ -246,7 +246,7 @@ fn built(
             }
             other => other,
         };
-        actors.push(recorded_actor(encounter, (&name, vehicle), speeds)?);
+        actors.push(recorded_actor(encounter, &name, vehicle, speeds)?);
     }
     let kept: Vec<&Participant> =
         std::iter::once(changer).chain(others.iter().map(|index| &encounter.vehicles[*index])).collect();
@@ -269,7 +269,8 @@ fn built(
 /// Returns an actor that starts as recorded and follows the recorded lateral path.
 fn recorded_actor(
     encounter: &RecordedEncounter,
-    (name, vehicle): (&str, &Participant),
+    name: &str,
+    vehicle: &Participant,
     driver: DriverConfig,
 ) -> Result<ActorConfig, String> {
     let start = start_of(&vehicle.trajectory).ok_or_else(|| format!("`{name}` appears after the start"))?;

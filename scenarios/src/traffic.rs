@@ -168,7 +168,8 @@ struct Block<'a> {
 impl<'a> Block<'a> {
     fn new(config: &'a TrafficConfig, road: &Road, parameters: &Parameters) -> Result<Self, ConfigError> {
         if !(1..=MAX_VEHICLES).contains(&config.vehicles) {
-            let problem = Problem::WrongCount { value: config.vehicles.into(), allowed: "a number of vehicles from 1 to 200" };
+            let problem =
+                Problem::WrongCount { value: config.vehicles.into(), allowed: "a number of vehicles from 1 to 200" };
             return Err(ConfigError::new("vehicles", problem));
         }
         if config.lanes.is_empty() {

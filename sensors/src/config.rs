@@ -508,8 +508,8 @@ impl Sensors {
             let faults = faults.of_sensor(camera.name);
             let classifier: Box<dyn DetectionClassifier> = match camera.pipeline {
                 Pipeline::Off => return None,
-                Pipeline::MaskRcnn => Box::new(ImageDetector::new((number, *camera), key, faults)),
-                Pipeline::CropClassifier => Box::new(WorkerClassifier::new((number, *camera), key, faults)),
+                Pipeline::MaskRcnn => Box::new(ImageDetector::new(number, *camera, key, faults)),
+                Pipeline::CropClassifier => Box::new(WorkerClassifier::new(number, *camera, key, faults)),
             };
             Some(CameraMember { camera: RearCamera::new(*camera), faults, classifier })
         };
@@ -663,7 +663,9 @@ mod tests {
         }
         assert!(error("rear-lidar.name = \"Left one\"").contains("`Left one` is no name"));
         let five = "{ name = \"a\" }, { name = \"b\" }, { name = \"c\" }, { name = \"d\" }";
-        assert!(error(&format!("additional-rear-lidars = [{five}]")).contains("has 4 entries, but at most 3 are allowed"));
+        assert!(
+            error(&format!("additional-rear-lidars = [{five}]")).contains("has 4 entries, but at most 3 are allowed")
+        );
         assert!(error("additional-rear-lidars = [{ name = \"a\", azimuth-deg = 90 }]").contains("[0].azimuth-deg"));
     }
 

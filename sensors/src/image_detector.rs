@@ -80,7 +80,7 @@ pub(crate) struct ImageDetector {
 
 impl ImageDetector {
     /// Creates the camera of one run with its number in the scenario. `key` is the key of its noise.
-    pub(crate) fn new((number, camera): (usize, Camera), key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+    pub(crate) fn new(number: usize, camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
         Self {
             number,
             camera,

@@ -66,7 +66,8 @@ impl RecordedPerception {
         &mut self,
         sensor: usize,
         points: RecordedPoints,
-        (road, ego): (&Road, VehicleState),
+        road: &Road,
+        ego: VehicleState,
     ) -> Result<usize, RecordedScanError> {
         let motion = ScanMotion { speed_mps: ego.speed_mps, yaw_rate_radps: ego.yaw_rate_radps };
         let (scan, outside) = points.into_scan(&self.lidars[sensor], self.frame, self.ego_length_m, motion)?;

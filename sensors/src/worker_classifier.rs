@@ -47,7 +47,7 @@ pub(crate) struct WorkerClassifier {
 
 impl WorkerClassifier {
     /// Creates the camera of one run with its number in the scenario. `key` is the key of its noise.
-    pub(crate) fn new((number, camera): (usize, Camera), key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+    pub(crate) fn new(number: usize, camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
         let exposures = Exposures::new((number, &camera), key, faults);
         Self { number, camera, exposures, memory: ImageMemory::default() }
     }

@@ -32,7 +32,7 @@ fn mask_overlap(first: &Mask, second: &Mask) -> f64 {
     if union == 0 { 1.0 } else { count(&|a, b| a && b) as f64 / union as f64 }
 }
 
-fn assert_same(instance: &Instance, (sides, score, cells): (&[f64], f64, &[f32])) {
+fn assert_same(instance: &Instance, sides: &[f64], score: f64, cells: &[f32]) {
     for (side, wanted) in instance.box_px.iter().zip(sides) {
         assert!((side - wanted).abs() <= BOX_PX, "{:?} instead of {sides:?}", instance.box_px);
     }
@@ -67,7 +67,7 @@ fn rust_and_python_find_the_same() {
         let boxes: Vec<Vec<f64>> = serde_json::from_value(answer["boxes"].clone()).unwrap();
         for (index, instance) in instances.iter().enumerate() {
             assert_eq!(instance.class as usize + 1, labels[index] as usize);
-            assert_same(instance, (&boxes[index], scores[index], masks.next().unwrap()));
+            assert_same(instance, &boxes[index], scores[index], masks.next().unwrap());
             compared += usize::from(instance.score > 0.5);
         }
     }

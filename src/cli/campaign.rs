@@ -594,7 +594,7 @@ impl Conclusion<'_> {
 
 /// Returns the simulated time and the wall time of the samples that have just been run (s), where
 /// they ran, and how many samples were there before.
-fn speed_text((simulated_s, wall_s): (f64, f64), resumed: u64, place: &str) -> String {
+fn speed_text(simulated_s: f64, wall_s: f64, resumed: u64, place: &str) -> String {
     let resumed = match resumed {
         0 => String::new(),
         resumed => format!("; not run again: {}", counted(resumed, "sample")),
@@ -606,7 +606,7 @@ impl Judged<'_> {
     fn print(&self) {
         let CampaignReport { manifest, works, tally, judged, .. } = self.report;
         print_text(CountsText(&tally.summary));
-        print_text(format_args!("{}\n", speed_text((self.simulated_s, self.wall_s), self.resumed, &self.place)));
+        print_text(format_args!("{}\n", speed_text(self.simulated_s, self.wall_s, self.resumed, &self.place)));
         print_text(self.companion.text(&tally.summary));
         print_text(ensemble_text(&tally.summary, manifest));
         print_text(CoverageText(judged));
@@ -865,9 +865,9 @@ mod tests {
     #[test]
     fn the_speed_is_of_the_samples_that_have_just_been_run() {
         let whole = "969 simulated seconds in 3.2 s on 1 thread";
-        assert_eq!(speed_text((969.4, 3.21), 0, "1 thread"), whole);
+        assert_eq!(speed_text(969.4, 3.21, 0, "1 thread"), whole);
         let nothing = "0 simulated seconds in 0.0 s on 2 threads; not run again: 20 samples";
-        assert_eq!(speed_text((0.0, 0.01), 20, "2 threads"), nothing);
+        assert_eq!(speed_text(0.0, 0.01, 20, "2 threads"), nothing);
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub(super) fn print_written(path: &Path) {
 /// Writes charts (SVG) into a folder, which is created if it does not exist, and prints their paths
 /// to standard error.
 pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) -> Result<(), WriteError> {
-    write_texts(folder, (paths, charts), print_written)
+    write_texts(folder, paths, charts, print_written)
 }
 
 /// Starts to print the progress of `bar` as lines. A terminal shows the bar itself instead.

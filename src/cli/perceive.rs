@@ -170,7 +170,7 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
         study_recording(input, &mut |step| {
             if args.tracks.is_some() {
                 let truth = step.scene.map(|scene| (scene, &name as &dyn Fn(usize) -> String));
-                recorder.record((step.time, step.tracks), truth);
+                recorder.record(step.time, step.tracks, truth);
             }
         })
     })?;

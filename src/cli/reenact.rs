@@ -88,7 +88,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let chosen = chosen_by(&args.file, &args.read, wanted, Ok)??;
     let (code, encounter) = (chosen.code(), chosen.value);
     let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
-    let file = scenario_of(&encounter, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
+    let file = scenario_of(&encounter, args.rear.into(), Path::new(&source), &args.sim.set.settings)?;
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.sim.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.sim.arm.arm(file.config().function)?, &args.watch)?;

@@ -64,7 +64,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         print_error(format_args!("{change}\n"));
     }
     let settings = [saved.manifest().settings(), args.set.settings.clone()].concat();
-    let outcomes = run_watched(&scenario, key, &arms, (&args.watch, &settings))?;
+    let outcomes = run_watched(&scenario, key, &arms, &args.watch, &settings)?;
     print((&scenario, &arms), &outcomes, args.format, &settings);
     if !args.set.settings.is_empty() {
         return Ok(ExitCode::Pass);

@@ -63,7 +63,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     }
     arms.iter().filter_map(|arm| arm.sensors).try_for_each(|mode| file.check_faults_in(mode))?;
     scenario.sensors.program().as_ref().map_or(Ok(()), try_program)?;
-    let outcomes = run_watched(&scenario, key, &arms, (&args.watch, file.settings()))?;
+    let outcomes = run_watched(&scenario, key, &arms, &args.watch, file.settings())?;
     print((&scenario, &arms), &outcomes, args.format, file.settings());
     Ok(ExitCode::Pass)
 }
@@ -81,7 +81,7 @@ pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome],
         (Format::Human, outcomes) => {
             let letters = VehicleLetters::of(scenario);
             for (outcome, arm) in outcomes.iter().zip(arms) {
-                let sentence = causal_sentence(scenario, (arm.sensors, arm.goal_s(scenario)), outcome);
+                let sentence = causal_sentence(scenario, arm.sensors, arm.goal_s(scenario), outcome);
                 print_text(OutcomeText { outcome, sentence: &sentence, letters: &letters });
             }
             textln!("{LETTERS}");

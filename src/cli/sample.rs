@@ -108,8 +108,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let variation = variation(from.ok_or_else(|| {
         usage(format!("--from is missing: `{}` has no calibrated value from which the steps start", args.vary))
     })?)?;
-    let mut all =
-        Sampled::new(&encounter, (zero.recorded, zero.run.run), (zero.reproduction, zero.step.lane_change_s[1]));
+    let mut all = Sampled::new(&encounter, zero.recorded, zero.run.run, zero.reproduction, zero.step.lane_change_s[1]);
     let mut films: Vec<_> = zero.run.film.into_iter().collect();
     let mut files: Vec<(String, ScenarioFile)> = Vec::new();
     let mut steps = vec![zero.step];
@@ -122,7 +121,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     for (number, value) in (1..).zip(variation.steps()) {
         let step = scenario_of(value)?;
         let work = format!("running step {number} of {}", args.steps);
-        let done = during(work, || run_step(&encounter, (value.label(), Some(value.value)), &step, args.seed));
+        let done = during(work, || run_step(&encounter, value.label(), Some(value.value), &step, args.seed));
         let done = done.map_err(|error| of_step(error, number))?;
         films.extend(done.film);
         all.runs.push(done.run);

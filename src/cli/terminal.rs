@@ -80,12 +80,12 @@ fn wrapped(text: &str, width: usize, breaks_words: bool) -> String {
         let indent = line.len() - content.len();
         let cells: Vec<&str> = content.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect();
         if cells.len() < 2 || line.chars().count() <= width {
-            lines.extend(wrapped_line(content, indent, (width, breaks_words)));
+            lines.extend(wrapped_line(content, indent, width, breaks_words));
             continue;
         }
         for (number, row) in rows(&cells, width.saturating_sub(indent + HANGING)).iter().enumerate() {
             let indent = if number == 0 { indent } else { (indent + HANGING).min(width / 2) };
-            lines.extend(wrapped_line(row, indent, (width, breaks_words)));
+            lines.extend(wrapped_line(row, indent, width, breaks_words));
         }
     }
     lines.join("\n")
@@ -107,7 +107,7 @@ fn rows(cells: &[&str], width: usize) -> Vec<String> {
 }
 
 /// Wraps one line at words, to a width (columns). The flag also breaks words that are wider.
-fn wrapped_line(content: &str, indent: usize, (width, breaks_words): (usize, bool)) -> Vec<String> {
+fn wrapped_line(content: &str, indent: usize, width: usize, breaks_words: bool) -> Vec<String> {
     let hanging = " ".repeat((indent + HANGING).min(width / 2));
     let options = Options::new(width).subsequent_indent(&hanging).word_splitter(WordSplitter::NoHyphenation);
     let options = options.break_words(breaks_words).word_separator(WordSeparator::AsciiSpace);

@@ -121,9 +121,10 @@ pub(super) fn run_watched(
     scenario: &Scenario,
     key: RunKey,
     arms: &[Arm],
-    (watch, settings): (&WatchArgs, &[Setting]),
+    watch: &WatchArgs,
+    settings: &[Setting],
 ) -> Result<Vec<Outcome>, CliError> {
-    let (outcomes, films) = run(scenario, key, arms, (watch, watch.record.is_some()))?;
+    let (outcomes, films) = run(scenario, key, arms, watch, watch.record.is_some())?;
     if let Some(path) = &watch.record {
         let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
         write_recording_unchecked(path, &films.into_iter().map(named).collect::<Vec<_>>())?;
@@ -140,7 +141,7 @@ pub(super) fn run_filmed(
     arm: &Arm,
     watch: &WatchArgs,
 ) -> Result<(Outcome, Film), CliError> {
-    let (mut outcomes, mut films) = run(scenario, key, std::slice::from_ref(arm), (watch, true))?;
+    let (mut outcomes, mut films) = run(scenario, key, std::slice::from_ref(arm), watch, true)?;
     Ok((outcomes.swap_remove(0), films.swap_remove(0)))
 }
 
@@ -149,7 +150,8 @@ fn run(
     scenario: &Scenario,
     key: RunKey,
     arms: &[Arm],
-    (watch, is_filmed): (&WatchArgs, bool),
+    watch: &WatchArgs,
+    is_filmed: bool,
 ) -> Result<(Vec<Outcome>, Vec<Film>), CliError> {
     watch.record.as_deref().map(check_recording_possible).transpose()?;
     let mode = arms.last().and_then(|arm| arm.sensors).unwrap_or_else(|| scenario.sensors.mode());

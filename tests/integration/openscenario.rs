@@ -491,7 +491,7 @@ fn the_distributions_that_closecall_exports_come_back_as_distributions() {
 
 /// Returns the scenario with a synchronisation of the truck in place of the lane change, which
 /// begins at 3 s. Then the ego is at 140 m and drives 30 m/s, and the truck at 170 m with 20 m/s.
-fn synchronised(attributes: &str, (master_m, target_m): (f64, f64), rest: &str) -> String {
+fn synchronised(attributes: &str, master_m: f64, target_m: f64, rest: &str) -> String {
     let start = SCENARIO.find("<LateralAction>").unwrap();
     let end = SCENARIO.find("</LateralAction>").unwrap() + "</LateralAction>".len();
     let action = format!(
@@ -521,7 +521,7 @@ fn a_synchronised_vehicle_arrives_at_its_target_when_its_master_does() {
         (relative("-5", "delta"), 25.0, 13.0),
         (relative("0.7", "factor"), 21.0, 13.0),
     ] {
-        let path = written(folder.path(), &synchronised(MASTER, (440.0, 400.0), &rest), ROAD);
+        let path = written(folder.path(), &synchronised(MASTER, 440.0, 400.0, &rest), ROAD);
         let said = stdout(&imported(&path, &output, &[]), 0);
         assert!((time_of(&said, "cut-in ends") - 13.0).abs() <= 0.021, "{rest}: {said}");
         assert!(said.contains("`Slow_Truck` arrives at its target at 13.00 s"), "{said}");
@@ -551,7 +551,7 @@ fn a_synchronisation_that_no_vehicle_can_keep_is_refused_with_the_reason() {
     const MASTER: &str = "masterEntityRef=\"Ego\"";
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
-    let right = synchronised(MASTER, (440.0, 400.0), "");
+    let right = synchronised(MASTER, 440.0, 400.0, "");
     let slows = "<ManeuverGroup name=\"others\" maximumExecutionCount=\"1\"><Actors selectTriggeringEntities=\"false\">\
                  <EntityRef entityRef=\"Ego\"/></Actors><Maneuver name=\"slows\"><Event name=\"slows\" \
                  priority=\"parallel\" maximumExecutionCount=\"1\"><Action name=\"slows-action\"><PrivateAction>\
@@ -564,17 +564,13 @@ fn a_synchronisation_that_no_vehicle_can_keep_is_refused_with_the_reason() {
     let with_group =
         |at_s: &str| right.replacen("</ManeuverGroup>", &format!("</ManeuverGroup>{}", slows.replace("AT", at_s)), 1);
     let lane = "<TargetPosition><LanePosition roadId=\"1\" laneId=\"-2\" s=\"400\"/>";
-    let final_speed = |speed: &str| synchronised(MASTER, (440.0, 400.0), &format!("<FinalSpeed>{speed}</FinalSpeed>"));
+    let final_speed = |speed: &str| synchronised(MASTER, 440.0, 400.0, &format!("<FinalSpeed>{speed}</FinalSpeed>"));
     for (scenario, element, word) in [
-        (synchronised(MASTER, (100.0, 400.0), ""), "TargetPositionMaster", "`Ego` is not before it"),
-        (synchronised(MASTER, (440.0, 100.0), ""), "TargetPosition", "m behind `Slow_Truck`"),
-        (synchronised(MASTER, (440.0, 250.0), ""), "SynchronizeAction", "0 to 100 m/s are possible"),
-        (synchronised(MASTER, (290.0, 400.0), ""), "SynchronizeAction", "-9 to 5 m/s² are possible"),
-        (
-            synchronised(MASTER, (20_000.0, 400.0), ""),
-            "SynchronizeAction",
-            "does not arrive at its target within 300 s",
-        ),
+        (synchronised(MASTER, 100.0, 400.0, ""), "TargetPositionMaster", "`Ego` is not before it"),
+        (synchronised(MASTER, 440.0, 100.0, ""), "TargetPosition", "m behind `Slow_Truck`"),
+        (synchronised(MASTER, 440.0, 250.0, ""), "SynchronizeAction", "0 to 100 m/s are possible"),
+        (synchronised(MASTER, 290.0, 400.0, ""), "SynchronizeAction", "-9 to 5 m/s² are possible"),
+        (synchronised(MASTER, 20_000.0, 400.0, ""), "SynchronizeAction", "does not arrive at its target within 300 s"),
         (right.replace(MASTER, "masterEntityRef=\"Slow_Truck\""), "SynchronizeAction", "the vehicle itself"),
         (right.replace(MASTER, "masterEntityRef=\"Nobody\""), "SynchronizeAction", "only Ego, Slow_Truck"),
         (right.replace(MASTER, ""), "SynchronizeAction", "it needs `masterEntityRef`"),

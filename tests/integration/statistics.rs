@@ -223,7 +223,10 @@ fn comfort_gates_report_the_limit_that_was_exceeded() {
         stdout(&closecall(args.iter().chain(more)), expected)
     };
     let jerk = run(&["--max-jerk", "0.5"], 1);
-    assert!(jerk.contains("NOT MET: low-thw-overtake-at-cut-out: largest value of the largest jerk of the ego"), "{jerk}");
+    assert!(
+        jerk.contains("NOT MET: low-thw-overtake-at-cut-out: largest value of the largest jerk of the ego"),
+        "{jerk}"
+    );
     assert!(jerk.contains("required: at most 0.5 m/s³ [max(max_jerk_mps3) <= 0.5; from command line]"), "{jerk}");
     let engagements = run(&["--max-engagement-rate", "0.01"], 1);
     assert!(

@@ -33,7 +33,8 @@ impl WriteError {
 /// [`WriteError`] if the folder or a file cannot be written.
 pub fn write_texts(
     folder: &Path,
-    (paths, texts): (&[PathBuf], &[String]),
+    paths: &[PathBuf],
+    texts: &[String],
     written: impl Fn(&Path),
 ) -> Result<(), WriteError> {
     create_folder(folder)?;

@@ -284,7 +284,8 @@ impl Target {
     /// Reads a damaged file. Returns the defect found, if any, or the panic.
     fn judged(
         &self,
-        (name, bytes): (&String, &[u8]),
+        name: &String,
+        bytes: &[u8],
         options: ReadOptions,
         window: usize,
     ) -> std::io::Result<std::thread::Result<Option<String>>> {
@@ -315,7 +316,7 @@ impl Target {
         // On a busy machine, any file may be slow once.
         for _ in 0..ATTEMPTS {
             let begun = Instant::now();
-            judged = self.judged((&name, &bytes), options, window)?;
+            judged = self.judged(&name, &bytes, options, window)?;
             fastest = fastest.min(begun.elapsed());
             if fastest <= MAX_DURATION {
                 break;

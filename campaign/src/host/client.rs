@@ -139,14 +139,14 @@ impl<W: World> Client<W> {
         let mut crashes = 0;
         let failure = loop {
             let left = limit.saturating_sub(self.world.now() - started);
-            match self.ask((work, arm, sample), left, false) {
+            match self.ask(work, arm, sample, left, false) {
                 // The message does not depend on the time that the process has taken to start.
                 Err(Trouble::Late) => break SampleError::Timeout { limit_s: limit.as_secs_f64() }.into(),
                 Ok(Answer { record, wall_s, check_s, .. }) => {
                     let flaky = first.map(|first| Flaky { crashes, first });
                     let mut run = ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
                     let left = limit.saturating_sub(self.world.now() - started);
-                    self.repeat_in_new_process((work, arm, sample), &mut run, left, on_outcome);
+                    self.repeat_in_new_process(work, arm, sample, &mut run, left, on_outcome);
                     return run;
                 }
                 Err(Trouble::Other(failure)) => break failure,
@@ -173,7 +173,9 @@ impl<W: World> Client<W> {
     /// The first process ends before: a licence or a device may serve one process at a time.
     fn repeat_in_new_process(
         &mut self,
-        (work, arm, sample): (&Work, usize, u64),
+        work: &Work,
+        arm: usize,
+        sample: u64,
         run: &mut ArmRun,
         limit: Duration,
         on_outcome: &OnOutcome<'_>,
@@ -186,7 +188,7 @@ impl<W: World> Client<W> {
         on_outcome(run);
         let started = self.world.now();
         drop(self.workers.remove(&key(work, arm)));
-        let answer = self.ask((work, arm, sample), limit, true);
+        let answer = self.ask(work, arm, sample, limit, true);
         run.check_s += (self.world.now() - started).as_secs_f64();
         let (Ok(outcome), Some(checks)) = (&run.record.result, &mut run.record.checks) else { return };
         let failure = match answer.map(|answer| answer.record.result) {
@@ -204,7 +206,9 @@ impl<W: World> Client<W> {
     /// that has answered is kept. `limit` is the time that is left.
     fn ask(
         &mut self,
-        (work, arm, sample): (&Work, usize, u64),
+        work: &Work,
+        arm: usize,
+        sample: u64,
         limit: Duration,
         is_repetition: bool,
     ) -> Result<Answer, Trouble> {

@@ -72,7 +72,7 @@ fn serve_one(arguments: &[String]) -> Result<(), String> {
             let table: VariableTable = read(table)?;
             let (kind, path) = file(controller)?;
             let loaded = Loaded::open(kind, Path::new(path)).map_err(|error| error.to_string())?;
-            bridge::serve((&loaded, &table), requests, answers)
+            bridge::serve(&loaded, &table, requests, answers)
         }
         ["probe-perception", path] => probe_library(Path::new(path), answers),
         ["perceive", path] => serve_library(Path::new(path), requests, answers),
@@ -116,7 +116,7 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
             "Closecall has changed since the start: it was {there}, and is {}. The results so far are kept",
             version()
         );
-        return refuse(answers, lines.next(), (CHANGED, reason));
+        return refuse(answers, lines.next(), CHANGED, reason);
     }
     let task: Task = read(&first)?;
     set_inference_backend(Backend::choose(task.onnxruntime.as_deref(), None));
@@ -125,7 +125,7 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
     let kind = if task.controller.native().is_some() { CHANGED } else { UNREADABLE };
     let controller = match task.controller.in_this_process() {
         Ok(controller) => controller,
-        Err(reason) => return refuse(answers, lines.next(), (kind, reason)),
+        Err(reason) => return refuse(answers, lines.next(), kind, reason),
     };
     let name = controller.name().to_owned();
     if let Some((name, words)) = task.hosted_perception {
@@ -202,7 +202,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn refuse(
     answers: &Arc<Mutex<File>>,
     question: Option<io::Result<String>>,
-    (kind, message): (&str, String),
+    kind: &str,
+    message: String,
 ) -> Result<(), String> {
     let Some(question) = question else { return Ok(()) };
     let question: serde_json::Value = question.map_err(|error| error.to_string()).and_then(|line| read(&line))?;

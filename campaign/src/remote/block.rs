@@ -106,7 +106,7 @@ impl BlockRunner {
             Content::Samples(samples) if samples.iter().any(|&sample| sample >= scenario_work.count()) => {
                 return Err(RemoteError::NoBlock { work });
             }
-            Content::Samples(samples) => self.run_in_pool((work, scenario_work), samples, on_finished),
+            Content::Samples(samples) => self.run_in_pool(work, scenario_work, samples, on_finished),
             Content::Points(points) => self.run_points(scenario_work, points, on_finished),
         };
         done.map_err(|error| super::EngineError { message: error.to_string(), is_input: false })?;
@@ -131,7 +131,8 @@ impl BlockRunner {
 
     fn run_in_pool(
         &self,
-        (number, work): (usize, &Arc<Work>),
+        number: usize,
+        work: &Arc<Work>,
         samples: &[u64],
         mut on_finished: impl FnMut(Finished),
     ) -> Result<(), WorkersError> {

@@ -103,7 +103,7 @@ impl SampleRunner for RemoteWorkers {
         on_finished: &mut OnFinished<'_>,
     ) -> Result<(), CampaignError> {
         let mut next = |most: usize| Content::Samples((&mut *samples).take(most).collect());
-        let done = self.run_blocks((number, work), &mut next, stop, on_finished);
+        let done = self.run_blocks(number, work, &mut next, stop, on_finished);
         // After an error, a stop or an end before the last sample, blocks are left.
         self.cluster.cancel();
         done
@@ -120,7 +120,7 @@ impl PointRunner for RemoteWorkers {
     ) -> Result<(), CampaignError> {
         let mut rest = points.iter().cloned();
         let mut next = |most: usize| Content::Points(rest.by_ref().take(most).collect());
-        let done = self.run_blocks((number, work), &mut next, stop, on_finished);
+        let done = self.run_blocks(number, work, &mut next, stop, on_finished);
         self.cluster.cancel();
         done
     }
@@ -139,7 +139,8 @@ impl RemoteWorkers {
 
     fn run_blocks(
         &self,
-        (number, work): (usize, &Arc<Work>),
+        number: usize,
+        work: &Arc<Work>,
         next: &mut NextContent<'_>,
         stop: &StopFlag,
         on_finished: &mut OnFinished<'_>,

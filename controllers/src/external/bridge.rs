@@ -36,7 +36,8 @@ enum Message {
 /// # Errors
 /// The message of the failure, after which the process is to end.
 pub fn serve(
-    (loaded, table): (&Loaded, &VariableTable),
+    loaded: &Loaded,
+    table: &VariableTable,
     requests: impl BufRead,
     mut answers: impl Write,
 ) -> Result<(), String> {

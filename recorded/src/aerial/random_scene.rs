@@ -64,7 +64,7 @@ pub fn random_scene(set: Set, frame: Frame, rng: &mut Stream) -> (AerialScene, A
     let wanted = (density * reach_m).ceil() as u64 + 1;
     let road = VisibleRoad { middle_m: view.target_m[0], reach_m, lanes, lane_m };
     for id in 0..wanted {
-        place(&mut scene, (set, id), &road, rng);
+        place(&mut scene, set, id, &road, rng);
     }
     (scene, camera)
 }
@@ -80,7 +80,7 @@ struct VisibleRoad {
     lane_m: f64,
 }
 
-fn place(scene: &mut AerialScene, (set, id): (Set, u64), road: &VisibleRoad, rng: &mut Stream) {
+fn place(scene: &mut AerialScene, set: Set, id: u64, road: &VisibleRoad, rng: &mut Stream) {
     let VisibleRoad { middle_m, reach_m, lanes, lane_m } = *road;
     let class = if rng.random_bool(0.4) { VehicleClass::Truck } else { VehicleClass::Car };
     let vehicle = random_vehicle(set, class, rng);

@@ -67,7 +67,7 @@ pub fn choose_first<T, E>(
 ) -> Result<Result<T, E>, ChoiceError> {
     let changes = criticality(data, &Judgement::default());
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
-    let encounter_of = |change: &LaneChange| encounter(data, change, &all, (period, lead));
+    let encounter_of = |change: &LaneChange| encounter(data, change, &all, period, lead);
     let mut candidates = by_severity(&changes, track);
     if let Some(number) = number {
         candidates.sort_by(|a, b| a.lane_change.crossing_s.total_cmp(&b.lane_change.crossing_s));

@@ -26,7 +26,8 @@ pub fn encounter(
     data: &SmoothedTrajectoryData,
     change: &LaneChange,
     all: &[LaneChange],
-    (period, lead): (Time, Lead),
+    period: Time,
+    lead: Lead,
 ) -> Result<RecordedEncounter, NoEncounter> {
     let roles = Roles::of(data, change, lead)?;
     let start = roles.start(data, change)?;

@@ -17,7 +17,7 @@ fn encounter_among(others: Vec<Trajectory>, lead: Lead) -> Result<RecordedEncoun
     let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
     let changes = detect(&data);
     let change = changes.iter().find(|change| change.track_id == 3).unwrap();
-    encounter(&data, change, &changes, (CONTROL_STEP, lead))
+    encounter(&data, change, &changes, CONTROL_STEP, lead)
 }
 
 /// Ego and lead vehicle, 30 m apart.
@@ -76,7 +76,7 @@ fn a_road_is_one_carriageway_of_several_with_markings() {
         data.markings = markings.clone();
         let data = smooth(&data);
         let changes = detect(&data);
-        let encounter = encounter(&data, &changes[0], &changes, (CONTROL_STEP, Lead::Required)).unwrap();
+        let encounter = encounter(&data, &changes[0], &changes, CONTROL_STEP, Lead::Required).unwrap();
         assert_eq!((encounter.lanes, encounter.home, encounter.target), (2, Lane(2), Lane(1)), "{shift_m}");
         let [ego, ..] = encounter.ego_lead_rear();
         assert!((ego.points[0].d_m + 5.25).abs() < 1e-6, "{}", ego.points[0].d_m);
@@ -124,7 +124,7 @@ fn a_crossing_at_the_start_is_not_repeated() {
     let changes = detect(&data);
     let of_rear: Vec<_> = changes.iter().filter(|change| change.track_id == 3).collect();
     let [first, second] = of_rear[..] else { panic!("{of_rear:?}") };
-    let encounter = encounter(&data, second, &changes, (CONTROL_STEP, Lead::Required)).unwrap();
+    let encounter = encounter(&data, second, &changes, CONTROL_STEP, Lead::Required).unwrap();
     assert_eq!(encounter.start, Time::from_s(first.crossing_s), "the encounter starts with the crossing");
     let kept: Vec<_> = encounter.vehicles[REAR_INDEX].changes.iter().map(|change| change.crossing_s).collect();
     assert_eq!(kept, [second.crossing_s]);
@@ -181,7 +181,7 @@ fn the_encounter_starts_with_the_record_of_the_vehicle_ahead_and_needs_two_secon
     late.points.retain(|point| point.time >= Time::from_s(11.5));
     let data = smooth(&trajectory_data_of(vec![late]));
     let changes = detect(&data);
-    let refused = encounter(&data, &changes[0], &changes, (CONTROL_STEP, Lead::LeftOut)).unwrap_err().to_string();
+    let refused = encounter(&data, &changes[0], &changes, CONTROL_STEP, Lead::LeftOut).unwrap_err().to_string();
     assert!(refused.starts_with("track 3 is recorded for") && refused.contains("2.0 s are needed"), "{refused}");
 }
 
@@ -200,6 +200,6 @@ fn the_second_of_two_quick_lane_changes_starts_before_the_first_one() {
     let data = smooth(&trajectory_data_of(vec![twice]));
     let changes = detect(&data);
     let [_, second] = &changes[..] else { panic!("{changes:?}") };
-    let encounter = encounter(&data, second, &changes, (CONTROL_STEP, Lead::LeftOut)).unwrap();
+    let encounter = encounter(&data, second, &changes, CONTROL_STEP, Lead::LeftOut).unwrap();
     assert!(encounter.start < Time::from_s(1.0) && encounter.rear().changes.len() == 2, "{}", encounter.start);
 }

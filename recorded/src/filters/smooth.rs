@@ -54,7 +54,7 @@ pub struct Presence {
 /// Smooths every track and resamples it to the common clock.
 pub fn smooth(data: &TrajectoryData) -> SmoothedTrajectoryData {
     let tracks: Vec<_> = data.trajectories.iter().filter_map(smooth_track).collect();
-    SmoothedTrajectoryData::new(&data.name, (data.markings.clone(), data.lanes), tracks)
+    SmoothedTrajectoryData::new(&data.name, data.markings.clone(), data.lanes, tracks)
 }
 
 /// Smooths one track and resamples it to the common clock.
@@ -80,11 +80,7 @@ pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
 
 impl SmoothedTrajectoryData {
     /// Creates the data of `tracks`, which are in order of their track ids.
-    pub(super) fn new(
-        name: &str,
-        (markings, lanes): (LaneMarkings, LaneReliability),
-        tracks: Vec<SmoothedTrack>,
-    ) -> Self {
+    pub(super) fn new(name: &str, markings: LaneMarkings, lanes: LaneReliability, tracks: Vec<SmoothedTrack>) -> Self {
         let (first_tick, present) = presence_by_tick(&tracks);
         Self { name: name.to_owned(), markings, lanes, tracks, first_tick, present }
     }

@@ -75,7 +75,7 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     tracks.sort_by_key(|track| track.trajectory.track_id);
     let markings = if file.states_markings() { file.markings().clone() } else { markings.finish() };
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
-    let data = SmoothedTrajectoryData::new(&file.name(), (markings, file.lanes()), tracks);
+    let data = SmoothedTrajectoryData::new(&file.name(), markings, file.lanes(), tracks);
     let (flaws, period, is_in_doubt) = (inspector.count_flaws(), file.period(), file.is_in_doubt());
     let (doubts_lanes, doubts_sides, hash) = (file.doubts_lanes(), file.doubts_sides(), file.hash());
     Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes, doubts_sides, warnings, hash }))

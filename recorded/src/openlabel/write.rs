@@ -114,7 +114,7 @@ pub(super) fn write(
     members(file, "relations", actions.iter().map(|(_, relation)| relation).enumerate())?;
     write!(file, ",\n\"frames\":{{")?;
     let spans: Vec<FrameInterval> = actions.iter().map(|(action, _)| action.frame_intervals[0]).collect();
-    let intervals = write_frames(file, (frames, vehicles), &spans, points)?;
+    let intervals = write_frames(file, frames, vehicles, &spans, points)?;
     write!(file, "}}")?;
     member(file, ",\n", "frame_intervals", &intervals)?;
     writeln!(file, "}}}}")?;
@@ -311,7 +311,8 @@ fn add_metric(data: &mut Data, name: &str, metric: MetricResult) {
 /// Writes the frames. Returns the intervals in which no frame is missing.
 fn write_frames(
     file: &mut dyn Write,
-    (frames, vehicles): (Frames, &[Vehicle]),
+    frames: Frames,
+    vehicles: &[Vehicle],
     spans: &[FrameInterval],
     mut points: SortedPoints,
 ) -> Result<Vec<FrameInterval>, Failure> {

@@ -110,7 +110,7 @@ pub(super) struct CollectedRow {
 
 impl CollectedRow {
     /// Returns the vehicle in the plane.
-    fn moment(&self, (point, heading_rad): (Point, f64), clock: Clock) -> PlaneMoment {
+    fn moment(&self, point: Point, heading_rad: f64, clock: Clock) -> PlaneMoment {
         let (vehicle, time, speed_mps) = (u64::from(self.vehicle), self.time, self.speed_mps);
         PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock }
     }
@@ -188,7 +188,7 @@ impl Collected {
         let mut doubled = take_doubled(&rows, &mut order, &numbers);
         let period = period(&rows, &order);
         let road = check_steps((&rows, &order), (facts.layout, facts.clock))
-            .and_then(|()| infer_road((&rows, &order), facts.lane_width_m, facts.clock));
+            .and_then(|()| infer_road(&rows, &order, facts.lane_width_m, facts.clock));
         // Numbers of several vehicles are a reason why the traffic shows no road.
         let road = road.map_err(|error| doubled.pop_first().map_or(error, |(_, first)| first))?;
         notes.extend(road.iter().flat_map(InferredRoad::warnings));
@@ -215,7 +215,7 @@ impl Collected {
                     Position::Road { road, s_m, d_m, lane } => (Some(Placed { s_m, d_m, lane }), road, 0),
                     Position::Plane { point, heading_rad, named_lane, .. } => {
                         let inferred = road.as_ref();
-                        let piece = pieces.number(row.moment((point, heading_rad), facts.clock));
+                        let piece = pieces.number(row.moment(point, heading_rad, facts.clock));
                         let chosen = || Some((piece, inferred?.direction(heading_rad)?));
                         direction = direction.filter(|(before, _)| *before == piece).or_else(chosen);
                         let place = inferred.zip(direction);
@@ -370,7 +370,7 @@ fn check_steps((rows, order): (&[CollectedRow], &[usize]), (layout, clock): (Lay
     let mut steps = PlaneSteps::default();
     for &index in order {
         if let Position::Plane { point, heading_rad, .. } = rows[index].position {
-            steps.add(rows[index].moment((point, heading_rad), clock));
+            steps.add(rows[index].moment(point, heading_rad, clock));
         }
     }
     steps.check(layout).map_err(ReadError::of_file)
@@ -407,7 +407,8 @@ fn take_doubled(rows: &[CollectedRow], order: &mut Vec<usize>, numbers: &[u64]) 
 /// If no row says who changes lanes, the vehicle whose path is the reference line may do so. Most
 /// vehicles then seem to move to the other side, and another path becomes the reference line.
 fn infer_road(
-    (rows, order): (&[CollectedRow], &[usize]),
+    rows: &[CollectedRow],
+    order: &[usize],
     lane_width_m: Option<f64>,
     clock: Clock,
 ) -> Result<Option<InferredRoad>, ReadError> {
@@ -421,7 +422,7 @@ fn infer_road(
             for &index in order {
                 let row = &rows[index];
                 if let Position::Plane { point, heading_rad, changes_lane, named_lane } = row.position {
-                    let vehicle = pieces.number(row.moment((point, heading_rad), clock));
+                    let vehicle = pieces.number(row.moment(point, heading_rad, clock));
                     let last_lane = before.filter(|(vehicle, _)| *vehicle == row.vehicle).and_then(|(_, lane)| lane);
                     before = Some((row.vehicle, named_lane));
                     // A file in another order than that of time cannot say who changes lanes, row by row.

@@ -149,7 +149,8 @@ impl HighdColumns {
         &self,
         vehicle: u64,
         is_upper: bool,
-        (x_m, y_m): (f64, f64),
+        x_m: f64,
+        y_m: f64,
         lane_id: i64,
     ) -> Result<RoadPosition, FieldError> {
         let (upper, lower) = (&self.data.upper_m, &self.data.lower_m);
@@ -221,7 +222,7 @@ impl TextLayout for HighdColumns {
             return Err(FieldError::at("xVelocity", wrong_value(text(velocity), needed)));
         }
         let lane_id = integer(text(lane), "laneId", allowed::LANES)?;
-        let RoadPosition { s_m, d_m, lane } = self.road_position(vehicle_id, is_upper, (x_m, y_m), lane_id)?;
+        let RoadPosition { s_m, d_m, lane } = self.road_position(vehicle_id, is_upper, x_m, y_m, lane_id)?;
         Ok(Some(Row {
             number: vehicle_id,
             origin: Time::ZERO,

@@ -131,7 +131,7 @@ pub fn open_from<'a>(
     let input = digest.input(source).map_err(|error| with_path(path, error))?;
     let source = if is_trace(path) { trace(input, &options) } else { reader_for(input, &options) };
     let source = source.map_err(|error| with_path(path, error))?;
-    Tracks::new((path, digest), source, options, window)
+    Tracks::new(path, digest, source, options, window)
 }
 
 /// Returns true if `path` has the name of a trace file of OSI, compressed or not.
@@ -173,7 +173,7 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
     let source = TextSource::with_meta(input, || set.meta(&digest), |rate_hz| road_from_traffic(&path, rate_hz));
     let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
     check_choice(&source, &options).map_err(in_tracks)?;
-    Tracks::new((&path, digest), Box::new(source), options, window)
+    Tracks::new(&path, digest, Box::new(source), options, window)
 }
 
 /// Rejects a file whose layout differs from the required one.
@@ -243,5 +243,5 @@ fn text_source<'a, R: BufRead + 'a>(input: R, options: &ReadOptions) -> Result<B
     {
         return Ok(Box::new(sumo::read_table(lines, (&header, separator, width))?));
     }
-    Ok(Box::new(TextSource::new(lines, (number, first), options.location)?))
+    Ok(Box::new(TextSource::new(lines, number, first, options.location)?))
 }

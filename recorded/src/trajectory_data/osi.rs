@@ -145,7 +145,7 @@ impl<R: BufRead> OsiReader<R> {
             let id = id.ok_or_else(|| refused(format!("{place}: `id` is missing or above {}", allowed::TRACKS.1)))?;
             let base = object.base.as_ref().ok_or_else(|| refused(format!("{place}: `base` is missing")))?;
             let kind = object.vehicle_classification.as_ref().and_then(|class| class.r#type);
-            vehicles.push(observed(&place, base, (id, time, number), class_of(kind))?);
+            vehicles.push(observed(&place, base, id, time, number, class_of(kind))?);
         }
         Ok(Some(vehicles))
     }
@@ -160,7 +160,9 @@ impl<R: BufRead> OsiReader<R> {
 fn observed(
     place: &str,
     base: &BaseMoving,
-    (number, time, message): (u64, Time, u64),
+    number: u64,
+    time: Time,
+    message: u64,
     class: VehicleClass,
 ) -> Result<Observed, ReadError> {
     let checked = |name: &str, value: Option<f64>, bounds: Bounds| {

@@ -224,10 +224,10 @@ impl QualityInspector {
         self.instants += track.points.len();
         let (Some(first), Some(last)) = (track.points.first(), track.points.last()) else { return };
         self.span = Some(self.span.map_or((first.time, last.time), |(a, b)| (a.min(first.time), b.max(last.time))));
-        self.add_piece(track, lines, (first, last));
+        self.add_piece(track, lines, first, last);
         for (k, pair) in track.points.windows(2).enumerate() {
             if let [before, point] = pair {
-                self.add_step(track.track_id, lines.get(k + 1).copied(), (before, point));
+                self.add_step(track.track_id, lines.get(k + 1).copied(), before, point);
             }
         }
         for (k, point) in track.points.iter().enumerate() {
@@ -240,7 +240,7 @@ impl QualityInspector {
     }
 
     /// Counts gaps and reused numbers before a piece of a track.
-    fn add_piece(&mut self, track: &Trajectory, lines: &[u64], (first, last): (&TrajectoryPoint, &TrajectoryPoint)) {
+    fn add_piece(&mut self, track: &Trajectory, lines: &[u64], first: &TrajectoryPoint, last: &TrajectoryPoint) {
         let (class, dimensions) = (track.class, track.dimensions);
         let seen = LastSeen { class, dimensions, time: last.time, s_m: last.s_m };
         let Some(before) = self.vehicles.insert(track.vehicle_id, seen) else { return };
@@ -270,7 +270,7 @@ impl QualityInspector {
     }
 
     /// Counts jumps and accelerations between two track points.
-    fn add_step(&mut self, track_id: u64, line: Option<u64>, (before, point): (&TrajectoryPoint, &TrajectoryPoint)) {
+    fn add_step(&mut self, track_id: u64, line: Option<u64>, before: &TrajectoryPoint, point: &TrajectoryPoint) {
         let step_s = (point.time - before.time).s();
         let speed_mps = 0.5 * (before.speed_mps + point.speed_mps);
         let (along_m, across_m) = (point.s_m - before.s_m - speed_mps * step_s, point.d_m - before.d_m);

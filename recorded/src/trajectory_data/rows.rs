@@ -196,7 +196,8 @@ pub(super) type TableRow<'a> = (u64, Result<(&'a str, &'a Fields), TrajectoryFil
 /// The first error of `take`.
 pub(super) fn each_row<R: BufRead, E>(
     lines: &mut Lines<R>,
-    (separator, width): (Separator, usize),
+    separator: Separator,
+    width: usize,
     mut take: impl FnMut(TableRow<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut fields = Fields::default();

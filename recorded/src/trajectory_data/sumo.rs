@@ -135,7 +135,7 @@ pub(super) fn read_table<R: BufRead>(
         }
     }
     let mut reader = Reader::default();
-    each_row(&mut lines, (separator, width), |(number, split)| {
+    each_row(&mut lines, separator, width, |(number, split)| {
         let (line, fields) = match split {
             Ok(split) => split,
             Err(problem) => return reader.collected.push(Err(ReadError::new(number, problem))),

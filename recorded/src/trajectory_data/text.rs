@@ -47,7 +47,8 @@ impl<R: BufRead> TextSource<R> {
     /// Fails if the first line fits no layout, or fits a layout that needs other files.
     pub(super) fn new(
         lines: Lines<R>,
-        (number, first): (u64, String),
+        number: u64,
+        first: String,
         asked: Option<&'static str>,
     ) -> Result<Self, ReadError> {
         let source = Self::with_recognised_layout(lines, number, first)?;
@@ -155,7 +156,7 @@ impl<R: BufRead> RowSource for TextSource<R> {
             if header.as_deref() == Some(line) {
                 return Err(ReadError::new(number, TrajectoryFileProblem::RepeatedHeader));
             }
-            let row = parse(line, format, fields, (name, location)).map_err(|error| ReadError::new(number, error))?;
+            let row = parse(line, format, fields, name, location).map_err(|error| ReadError::new(number, error))?;
             let last_field = fields.last_len();
             if lines.is_unterminated() && last_field < *usual_last_field {
                 return Err(ReadError::new(number, TrajectoryFileProblem::CutLine));
@@ -199,7 +200,8 @@ fn parse(
     line: &str,
     format: &mut Format,
     fields: &mut Fields,
-    (name, location): (&mut Option<String>, &mut Location),
+    name: &mut Option<String>,
+    location: &mut Location,
 ) -> Result<Option<Row>, FieldError> {
     let with_points;
     let line = if format.separator == Separator::Semicolon && line.contains(',') {

@@ -177,7 +177,8 @@ pub struct Tracks<'a> {
 impl<'a> Tracks<'a> {
     /// Reads the first `window` rows, or all rows if the file is not longer.
     pub(super) fn new(
-        (path, digest): (&Path, Digest),
+        path: &Path,
+        digest: Digest,
         mut source: Box<dyn RowSource + 'a>,
         options: ReadOptions,
         window: usize,

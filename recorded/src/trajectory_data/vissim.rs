@@ -238,7 +238,7 @@ pub(super) fn read(input: impl BufRead) -> Result<CollectedSource, ReadError> {
         names_lanes: false,
         steps: [0.0; 2],
     };
-    each_row(&mut lines, (Separator::Semicolon, width), |(number, split)| {
+    each_row(&mut lines, Separator::Semicolon, width, |(number, split)| {
         let row = split.map_err(FieldError::from).and_then(|(line, fields)| reader.row(line, fields, number));
         reader.collected.push(row.map_err(|error| ReadError::new(number, error)))
     })?;

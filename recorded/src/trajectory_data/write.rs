@@ -32,7 +32,7 @@ pub fn write_trajectories(data: &TrajectoryData, path: &Path) -> Result<(), Writ
             for point in &track.points {
                 check_finite(track, point)?;
                 let frame = frame(track, point, data.period)?;
-                write_row(file, &name, (track, point, frame))?;
+                write_row(file, &name, track, point, frame)?;
             }
         }
         Ok(())
@@ -98,7 +98,9 @@ pub(crate) fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Resul
 fn write_row(
     file: &mut dyn Write,
     name: &str,
-    (track, point, frame): (&Trajectory, &TrajectoryPoint, i64),
+    track: &Trajectory,
+    point: &TrajectoryPoint,
+    frame: i64,
 ) -> io::Result<()> {
     let TrajectoryPoint { s_m, d_m, lane, speed_mps, acceleration_mps2, .. } = point;
     write!(file, "{name},{},{},{frame},{},", track.track_id, track.vehicle_id, point.time.s())?;

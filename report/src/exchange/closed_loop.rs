@@ -291,7 +291,7 @@ impl Writer<'_> {
             .with("displacement", "trailingReferencedEntity")
             .child(limits)
             .within("LongitudinalAction");
-        let when = gap_below(&format!("{name}-is-near-{lead}"), (name, lead), begins_m);
+        let when = gap_below(&format!("{name}-is-near-{lead}"), name, lead, begins_m);
         Some(event(&format!("{name}-follows"), "override", action, when))
     }
 
@@ -311,7 +311,7 @@ impl Writer<'_> {
             true => crossing + (speed.clone() - self.speed(ahead)) * duration.clone() * 0.5.into() / speed,
             false => crossing,
         };
-        let when = headway_below(&format!("{name}-comes-close-to-{lead}"), (name, lead), begins_s);
+        let when = headway_below(&format!("{name}-comes-close-to-{lead}"), name, lead, begins_s);
         Some(event(&cut_out_name(name), "override", change_lanes(lane, duration), when))
     }
 
@@ -414,7 +414,8 @@ impl Writer<'_> {
             }
             (TriggerConfig::ThwBelow(below), _) => headway_below(
                 &condition_name,
-                (below.from.as_str(), below.to.as_str()),
+                below.from.as_str(),
+                below.to.as_str(),
                 self.values.expression(&below.thw_s),
             ),
             (TriggerConfig::CutOutStarted(cut_out), _) => {

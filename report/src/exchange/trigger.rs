@@ -16,7 +16,7 @@ pub(super) fn at(name: &str, time_s: Expression) -> Element {
 
 /// Returns the condition that the time headway of `from` to `to`, bumper to bumper, is below a
 /// value (s).
-pub(super) fn headway_below(name: &str, (from, to): (&str, &str), thw_s: Expression) -> Element {
+pub(super) fn headway_below(name: &str, from: &str, to: &str, thw_s: Expression) -> Element {
     let headway = Element::new("TimeHeadwayCondition")
         .with("entityRef", to)
         .with("value", thw_s)
@@ -28,7 +28,7 @@ pub(super) fn headway_below(name: &str, (from, to): (&str, &str), thw_s: Express
 }
 
 /// Returns the condition that the gap of `from` to `to`, bumper to bumper, is below a value (m).
-pub(super) fn gap_below(name: &str, (from, to): (&str, &str), gap_m: Expression) -> Element {
+pub(super) fn gap_below(name: &str, from: &str, to: &str, gap_m: Expression) -> Element {
     let gap = Element::new("RelativeDistanceCondition")
         .with("entityRef", to)
         .with("relativeDistanceType", "longitudinal")

@@ -59,7 +59,7 @@ pub struct TrackRecorder {
 impl TrackRecorder {
     /// Appends the tracks of one step of a recording. `truth` has the vehicles that its labels
     /// show, if there are any, with the name of each.
-    pub fn record(&mut self, (time, tracks): (Time, &[Track]), truth: Option<(&Scene<'_>, &dyn Fn(usize) -> String)>) {
+    pub fn record(&mut self, time: Time, tracks: &[Track], truth: Option<(&Scene<'_>, &dyn Fn(usize) -> String)>) {
         match truth {
             None => self.append((time, tracks), Ok(vec![None; tracks.len()]), &|actor| actor.to_string()),
             Some((scene, name)) => {

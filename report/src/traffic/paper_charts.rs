@@ -77,7 +77,7 @@ pub(super) fn histogram(
     let values: Vec<f64> = complete.filter_map(value_of).filter(|value| value.is_finite()).collect();
     let limit = threshold(metric, speed_limit_mps);
     let title = format!("{} of {} complete lane changes", labelled(metric), values.len());
-    file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), (&values, limit), is_above(metric)))
+    file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), &values, limit, is_above(metric)))
 }
 
 /// Returns the number of values in each bar. Bar 0 begins at the threshold, so no bar holds
@@ -99,13 +99,7 @@ fn whole_number_axis(name: &str, end: f64) -> ChartAxis<'_> {
     ChartAxis { name, range: 0.0..end, labels: COUNT_LABELS, text: Box::new(text), has_grid: true }
 }
 
-fn draw_histogram(
-    canvas: &Canvas<'_>,
-    title: &str,
-    name: &str,
-    (values, limit): (&[f64], f64),
-    is_above: bool,
-) -> Drawn {
+fn draw_histogram(canvas: &Canvas<'_>, title: &str, name: &str, values: &[f64], limit: f64, is_above: bool) -> Drawn {
     let side = if is_above { "above" } else { "below" };
     let x = number_axis(name, range(values.iter().copied().chain([limit]), Some(0.0)));
     let (start, width) = (x.range.start, (x.range.end - x.range.start) / BARS as f64);

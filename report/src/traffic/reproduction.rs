@@ -61,7 +61,8 @@ impl Reproduction {
     fn new(
         [recorded, run]: [&SampledRun; 2],
         ahead: &[(Time, Option<FollowingInstant>)],
-        (driver, calibrated): (&Wiedemann99Config, Calibrated),
+        driver: &Wiedemann99Config,
+        calibrated: Calibrated,
         collision: Option<String>,
     ) -> Self {
         let mut largest_along_m: f64 = 0.0;
@@ -228,12 +229,12 @@ fn closest(
     let attempt = |calibrated: Calibrated| -> Result<StepZero, StepZeroError> {
         let driver = calibrate_replaced(encounter, &ahead, calibrated);
         let step = built(&driver)?;
-        let run = run_step(encounter, ("step 0".to_owned(), None), &step, seed)?;
+        let run = run_step(encounter, "step 0".to_owned(), None, &step, seed)?;
         // A collision of two other vehicles is one of their recorded positions. It matters if the
         // run ends with it before the crossing.
         let collision = run.run.collision.as_ref().filter(|(_, time_s)| *time_s <= until.s());
         let collision = collision.map(|(other, time_s)| format!("it collides with {other} at {time_s:.2} s"));
-        let reproduction = Reproduction::new([&recorded, &run.run], &ahead, (&driver, calibrated), collision);
+        let reproduction = Reproduction::new([&recorded, &run.run], &ahead, &driver, calibrated, collision);
         let (encounter, recorded) = (encounter.clone(), recorded.clone());
         Ok(StepZero { encounter, driver, step, recorded, run, reproduction })
     };

@@ -83,10 +83,12 @@ struct Vehicles<'a> {
 impl SampledRun {
     /// Evaluates the run of one step. `tracks` are the trajectories of its actors, in their order.
     pub fn simulated(
-        (name, value): (String, Option<f64>),
+        name: String,
+        value: Option<f64>,
         encounter: &RecordedEncounter,
         step: &SampledEncounter,
-        (tracks, outcome): (&[Trajectory], &Outcome),
+        tracks: &[Trajectory],
+        outcome: &Outcome,
     ) -> Self {
         let [opp1, opp2] = [step.opp1, step.opp2].map(|index| index.map(|index| &tracks[index]));
         let vehicles = Vehicles { own: &tracks[step.lane_changer], opp1, opp2 };
@@ -194,7 +196,8 @@ pub struct StepRun {
 /// [`StepError`] if the scenario cannot be run, or if no road can be drawn from its lanes.
 pub fn run_step(
     encounter: &RecordedEncounter,
-    (name, value): (String, Option<f64>),
+    name: String,
+    value: Option<f64>,
     step: &SampledEncounter,
     seed: u64,
 ) -> Result<StepRun, StepError> {
@@ -204,7 +207,7 @@ pub fn run_step(
     recorder.begin(&scenario);
     let outcome = run_guarded(&scenario, RunKey { seed, sample: 0 }, &arm, &mut recorder)?;
     let data = recorder.finish(&format!("{}, {name}", encounter.data_name));
-    let run = SampledRun::simulated((name.clone(), value), encounter, step, (&data.trajectories, &outcome));
+    let run = SampledRun::simulated(name.clone(), value, encounter, step, &data.trajectories, &outcome);
     let smoothed = smooth(&data);
     let track_id = data.trajectories[step.lane_changer].track_id;
     let changes = criticality(&smoothed, &Judgement::default());
@@ -282,8 +285,10 @@ impl Sampled {
     /// `until_s` is the end of the lane change (s).
     pub fn new(
         encounter: &RecordedEncounter,
-        (recorded, step_0): (SampledRun, SampledRun),
-        (reproduction, until_s): (Reproduction, f64),
+        recorded: SampledRun,
+        step_0: SampledRun,
+        reproduction: Reproduction,
+        until_s: f64,
     ) -> Self {
         let track = |index: usize| &encounter.vehicles[index].trajectory;
         let title = format!("{}: lane change of track {}", encounter.data_name, encounter.rear().trajectory.track_id);

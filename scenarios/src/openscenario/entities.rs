@@ -42,7 +42,7 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError
         for child in &entity.children {
             match child.name.as_str() {
                 "Vehicle" => vehicle = Some(of_element(reader, child)?),
-                "CatalogReference" => vehicle = Some(of_catalog(reader, (root, &mut catalogs), child)?),
+                "CatalogReference" => vehicle = Some(of_catalog(reader, root, &mut catalogs, child)?),
                 "ObjectController" => entities.controlled.push(name.clone()),
                 _ => {
                     return Err(reader.error(
@@ -95,11 +95,7 @@ impl Catalogs {
     }
 }
 
-fn of_catalog(
-    reader: &Reader,
-    (root, catalogs): (&Node, &mut Catalogs),
-    reference: &Node,
-) -> Result<Vehicle, ImportError> {
+fn of_catalog(reader: &Reader, root: &Node, catalogs: &mut Catalogs, reference: &Node) -> Result<Vehicle, ImportError> {
     let [catalog, entry] = ["catalogName", "entryName"].map(|name| reader.text(reference, name));
     let (catalog, entry) = (catalog?, entry?);
     let Some(locations) = root.child("CatalogLocations") else {
@@ -162,20 +158,20 @@ fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
         _ => return Err(reader.error(node, format!("a `{category}` is not a car, truck or motorcycle"))),
     };
     let size = reader.child(node, &["BoundingBox", "Dimensions"])?;
-    let length_m = within(reader, size, ("length", Dimensions::LENGTH_M, "m"))?;
-    let width_m = within(reader, size, ("width", Dimensions::WIDTH_M, "m"))?;
-    let height_m = within(reader, size, ("height", Dimensions::HEIGHT_M, "m"))?;
+    let length_m = within(reader, size, "length", Dimensions::LENGTH_M, "m")?;
+    let width_m = within(reader, size, "width", Dimensions::WIDTH_M, "m")?;
+    let height_m = within(reader, size, "height", Dimensions::HEIGHT_M, "m")?;
     let centre = reader.child(node, &["BoundingBox", "Center"])?;
     // The reference point lies under the box, or not far from it.
     for (name, size_m) in [("x", length_m), ("y", width_m), ("z", height_m)] {
         if centre.raw(name).is_some() {
-            within(reader, centre, (name, Range::closed(-size_m, size_m), "m"))?;
+            within(reader, centre, name, Range::closed(-size_m, size_m), "m")?;
         }
     }
     let mass_kg = match reader.number_or(node, "mass", 0.0)? {
         // Some programs write a mass of 0 if they do not know it.
         0.0 => None,
-        _ => Some(within(reader, node, ("mass", closecall_traffic::Vehicle::MASS_KG, "kg"))?),
+        _ => Some(within(reader, node, "mass", closecall_traffic::Vehicle::MASS_KG, "kg")?),
     };
     Ok(Vehicle {
         class,
@@ -189,7 +185,7 @@ fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
 }
 
 /// Returns a number in the range that a vehicle of a scenario can have.
-fn within(reader: &Reader, node: &Node, (name, range, unit): (&str, Range, &str)) -> Result<f64, ImportError> {
+fn within(reader: &Reader, node: &Node, name: &str, range: Range, unit: &str) -> Result<f64, ImportError> {
     let value = reader.number(node, name)?;
     match range.contains(value) {
         true => Ok(value),

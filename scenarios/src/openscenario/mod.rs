@@ -169,7 +169,7 @@ fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Im
     if let (ValueSource::Stochastic(stochastic), None, Some(text)) =
         (&file.values, options.value_set, text_of_closecall(&scenario_root))
     {
-        return of_closecall(&scenario, &scenario_root, (text, options), Some((stochastic, reader.path.as_path())));
+        return of_closecall(&scenario, &scenario_root, text, options, Some((stochastic, reader.path.as_path())));
     }
     let count = file.count();
     let number = match options.value_set {
@@ -199,13 +199,13 @@ fn of_values(reader: &Reader, root: &Node, options: &ImportOptions) -> Result<Im
 fn import_scenario(reader: &Reader, mut root: Node, options: &ImportOptions) -> Result<Imported, ImportFailure> {
     let path = &reader.path;
     if let Some(text) = text_of_closecall(&root) {
-        return of_closecall(reader, &root, (text, options), None);
+        return of_closecall(reader, &root, text, options, None);
     }
     check_options(reader, &root, options)?;
     let mut notes = structure::check(path, &mut root, &options.parameters.iter().cloned().collect())?;
     let Entities { vehicles, controlled, notes: of_entities } = entities::read(reader, &root)?;
     notes.extend(of_entities);
-    let ego = ego_of(reader, &root, (&vehicles, &controlled), options.ego.as_deref())?;
+    let ego = ego_of(reader, &root, &vehicles, &controlled, options.ego.as_deref())?;
     let storyboard = reader.child(&root, &["Storyboard"])?;
     let road = road_of(reader, &root, storyboard)?;
     let mut played = Storyboard::new(reader.clone(), &road, vehicles, ego);
@@ -215,9 +215,9 @@ fn import_scenario(reader: &Reader, mut root: Node, options: &ImportOptions) -> 
     let starts = played.vehicles.clone();
     played.play(storyboard)?;
     let environment = environment(reader, &globals, &mut played.notes)?;
-    let text = scenario_text(path, &mut played, (&starts, &environment))?;
+    let text = scenario_text(path, &mut played, &starts, &environment)?;
     let parsed = ScenarioFile::parse(path, &text, &[]).and_then(|file| file.check());
-    parsed.map_err(|source| at_element(reader, (&root, &starts), source))?;
+    parsed.map_err(|source| at_element(reader, &root, &starts, source))?;
     Ok(Imported { text, notes: played.notes, events: played.events })
 }
 
@@ -233,7 +233,7 @@ fn check_options(reader: &Reader, root: &Node, options: &ImportOptions) -> Resul
 
 /// Returns the error of the scenario that a file describes at the element that describes its part:
 /// the lines of the scenario file are none of the reader's.
-fn at_element(reader: &Reader, (root, vehicles): (&Node, &[Vehicle]), error: ScenarioError) -> ImportFailure {
+fn at_element(reader: &Reader, root: &Node, vehicles: &[Vehicle], error: ScenarioError) -> ImportFailure {
     let ScenarioError::Value { source, .. } = &error else {
         return ImportFailure::Scenario { path: reader.path.clone(), source: Box::new(error) };
     };
@@ -287,7 +287,8 @@ pub fn content_hash(text: &str) -> Option<String> {
 fn of_closecall(
     reader: &Reader,
     root: &Node,
-    (text, options): (&str, &ImportOptions),
+    text: &str,
+    options: &ImportOptions,
     distributions: Option<(&Stochastic, &Path)>,
 ) -> Result<Imported, ImportFailure> {
     let path = &reader.path;
@@ -349,7 +350,8 @@ fn text_of_closecall(root: &Node) -> Option<&str> {
 fn ego_of(
     reader: &Reader,
     root: &Node,
-    (vehicles, controlled): (&[Vehicle], &[String]),
+    vehicles: &[Vehicle],
+    controlled: &[String],
     asked: Option<&str>,
 ) -> Result<usize, ImportError> {
     let position = |name: &str| vehicles.iter().position(|vehicle| vehicle.name == name);
@@ -502,7 +504,8 @@ fn points(speeds: &[(f64, f64)]) -> Vec<(f64, f64)> {
 fn scenario_text(
     path: &Path,
     played: &mut Storyboard<'_>,
-    (starts, environment): (&[Vehicle], &str),
+    starts: &[Vehicle],
+    environment: &str,
 ) -> Result<String, ImportError> {
     let road = played.road;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();

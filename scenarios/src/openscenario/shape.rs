@@ -114,7 +114,7 @@ impl Checker<'_> {
     }
 
     /// Checks a number that may be absent.
-    fn within(&self, node: &Node, name: &str, ([low, high], unit): ([f64; 2], &str)) -> Result<f64, ImportError> {
+    fn within(&self, node: &Node, name: &str, [low, high]: [f64; 2], unit: &str) -> Result<f64, ImportError> {
         let value = self.number_or_0(node, name)?;
         match node.raw(name).is_none() || (low..=high).contains(&value) {
             true => Ok(value),
@@ -142,14 +142,14 @@ impl Checker<'_> {
             let length_m = length(self.path, geometry)?;
             let s_m = self.place(geometry, "s")?;
             for name in ["x", "y"] {
-                self.within(geometry, name, ([-MOST_COORDINATE_M, MOST_COORDINATE_M], " m"))?;
+                self.within(geometry, name, [-MOST_COORDINATE_M, MOST_COORDINATE_M], " m")?;
             }
-            self.within(geometry, "hdg", ([-MOST_HEADING_RAD, MOST_HEADING_RAD], " rad"))?;
+            self.within(geometry, "hdg", [-MOST_HEADING_RAD, MOST_HEADING_RAD], " rad")?;
             for shape in &geometry.children {
                 self.shape(shape, length_m)?;
             }
             if let Some((other, other_m)) = before {
-                self.follows((other, other_m), geometry)?;
+                self.follows(other, other_m, geometry)?;
             }
             let end_m = s_m + length_m;
             if !(end_m <= self.length_m + tolerance_m(self.length_m)) {
@@ -178,7 +178,7 @@ impl Checker<'_> {
 
     /// Checks that a piece of the reference line begins where the piece before it, with its length
     /// (m), ends.
-    fn follows(&self, (before, before_m): (&Node, f64), geometry: &Node) -> Result<(), ImportError> {
+    fn follows(&self, before: &Node, before_m: f64, geometry: &Node) -> Result<(), ImportError> {
         let has = |name: &str| before.raw(name).is_some() && geometry.raw(name).is_some();
         let step = |name: &str| -> Result<f64, ImportError> {
             Ok(number(self.path, geometry, name)? - number(self.path, before, name)?)

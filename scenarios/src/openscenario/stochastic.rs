@@ -294,7 +294,7 @@ fn variance(reader: &Reader, node: &Node) -> Result<f64, ImportError> {
 }
 
 /// Returns a distribution without variance, which its range must contain.
-fn degenerate(reader: &Reader, node: &Node, (value, limits): (f64, Option<[f64; 2]>)) -> Result<Shape, ImportError> {
+fn degenerate(reader: &Reader, node: &Node, value: f64, limits: Option<[f64; 2]>) -> Result<Shape, ImportError> {
     match limits.is_none_or(|[low, high]| (low..=high).contains(&value)) {
         true => number(reader, node, constant(value)),
         false => Err(reader.error(node, format!("its only value {value} lies outside its `Range`"))),
@@ -305,7 +305,7 @@ fn normal(reader: &Reader, node: &Node) -> Result<Shape, ImportError> {
     let (mean, sd) = (reader.number(node, "expectedValue")?, variance(reader, node)?.sqrt());
     let limits = truncation(reader, node)?;
     if sd == 0.0 {
-        return degenerate(reader, node, (mean, limits));
+        return degenerate(reader, node, mean, limits);
     }
     let [min, max] = limits.unwrap_or([mean - UNBOUNDED_SD * sd, mean + UNBOUNDED_SD * sd]);
     let normal = ParameterConfig {
@@ -323,7 +323,7 @@ fn log_normal(reader: &Reader, node: &Node) -> Result<Shape, ImportError> {
     }
     let spread = variance / (expected * expected);
     if spread == 0.0 {
-        return degenerate(reader, node, (expected, limits));
+        return degenerate(reader, node, expected, limits);
     }
     if let Some([low, high]) = limits
         && low == high

@@ -488,7 +488,7 @@ impl<'a> Storyboard<'a> {
         let (to_mps, stays) = self.target_speed(node)?;
         let to_mps = self.possible(node, to_mps)?;
         let from_mps = self.vehicles[actor].speed_mps;
-        let (duration_s, is_smooth) = self.transition(dynamics, (from_mps, to_mps), 0.5 * (from_mps + to_mps))?;
+        let (duration_s, is_smooth) = self.transition(dynamics, from_mps, to_mps, 0.5 * (from_mps + to_mps))?;
         if duration_s > 0.0 && actor != self.ego {
             // A smooth change of speed has a higher acceleration in its middle.
             let steepness = if is_smooth { 1.5 } else { 1.0 };
@@ -543,7 +543,7 @@ impl<'a> Storyboard<'a> {
 
     /// Returns the duration of a transition (s), and whether it is smooth. `mean_mps` is the mean
     /// speed in it.
-    fn transition(&self, node: &Node, (from, to): (f64, f64), mean_mps: f64) -> Result<(f64, bool), ImportError> {
+    fn transition(&self, node: &Node, from: f64, to: f64, mean_mps: f64) -> Result<(f64, bool), ImportError> {
         let shape = self.reader.text(node, "dynamicsShape")?;
         // The largest slope of a smooth transition is higher than the mean one.
         let (is_smooth, steepness) = match shape.as_str() {
@@ -660,8 +660,7 @@ impl<'a> Storyboard<'a> {
                 .error(target, format!("from lane {from} to lane {to}: only the next lane is read")));
         }
         let dynamics = self.reader.child(node, &["LaneChangeActionDynamics"])?;
-        let (duration_s, _) =
-            self.transition(dynamics, (0.0, self.road.lane_width_m), self.vehicles[actor].speed_mps)?;
+        let (duration_s, _) = self.transition(dynamics, 0.0, self.road.lane_width_m, self.vehicles[actor].speed_mps)?;
         let at_s = self.time_s;
         (self.vehicles[actor].lane, self.vehicles[actor].offset_m) = (to, 0.0);
         running.is_lateral.push(actor);

@@ -44,7 +44,7 @@ impl Copula {
             for (partner, spearman) in partners {
                 let at = |error: ConfigError| error.within(KEY).within(name.as_str());
                 let pair = [name, partner].map(|parameter| entries.keys().position(|previous| previous == parameter));
-                check(entries, (name, partner), *spearman).map_err(at)?;
+                check(entries, name, partner, *spearman).map_err(at)?;
                 let [Some(a), Some(b)] = pair else { continue };
                 let previous = pairs.insert((a.min(b), a.max(b)), *spearman);
                 if previous.is_some_and(|previous| previous != *spearman) {
@@ -102,7 +102,8 @@ impl Copula {
 
 fn check(
     entries: &BTreeMap<ParameterName, SpaceEntry>,
-    (name, partner): (&ParameterName, &ParameterName),
+    name: &ParameterName,
+    partner: &ParameterName,
     spearman: f64,
 ) -> Result<(), ConfigError> {
     if name == partner {

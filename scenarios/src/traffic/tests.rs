@@ -99,7 +99,11 @@ fn what_is_wrong_is_named_with_what_is_allowed() {
     };
     for (from, to, expected) in [
         ("vehicles = 30", "vehicels = 30", "did you mean `vehicles`?"),
-        ("vehicles = 30", "vehicles = 0", "`traffic[0].vehicles` is 0, but a number of vehicles from 1 to 200 is needed"),
+        (
+            "vehicles = 30",
+            "vehicles = 0",
+            "`traffic[0].vehicles` is 0, but a number of vehicles from 1 to 200 is needed",
+        ),
         (
             "lanes = [1, 2, 3]",
             "lanes = [1, 4]",

@@ -83,7 +83,8 @@ impl Frame {
     pub(super) fn background(
         &self,
         background: &Background,
-        (x, length): (f32x4, f32),
+        x: f32x4,
+        length: f32,
         lit: &GroundLight<'_>,
         noise: &mut BackgroundNoise,
     ) -> Option<(Vec3, f32)> {

@@ -144,7 +144,7 @@ impl InstanceDetector {
         let input = TensorRef::from_array_view((&sides[4 - rank..], self.planes.as_slice())).map_err(run)?;
         let outputs = self.session.run(ort::inputs![name.as_str() => input]);
         clear_upper_parts();
-        instances(&outputs.map_err(run)?, &self.outputs, (&self.labels, &self.name))
+        instances(&outputs.map_err(run)?, &self.outputs, &self.labels, &self.name)
     }
 }
 
@@ -171,7 +171,8 @@ impl InstanceDetector {
 fn instances(
     outputs: &SessionOutputs<'_>,
     names: &[String; 4],
-    (map, model): (&LabelMap, &str),
+    map: &LabelMap,
+    model: &str,
 ) -> Result<Vec<Instance>, ClassifierError> {
     let [boxes, labels, scores, masks] = names;
     let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };

@@ -136,9 +136,9 @@ impl Frame {
         let pixel = [line.columns[place], line.row];
         let left_px = pixel[0] as f32;
         let (centre, length) = line.centre(self, place);
-        let (mut light, nearness) = match self.at_once((sample, place), length, line) {
+        let (mut light, nearness) = match self.at_once(sample, place, length, line) {
             Some(colour) => colour,
-            None => self.moment_by_moment((sample, place), length, line),
+            None => self.moment_by_moment(sample, place, length, line),
         };
         let reaches = |bounds_px: &Bounds| left_px <= bounds_px[2] && bounds_px[0] <= left_px + 1.0;
         let mut glare = [0.0; 3];
@@ -182,35 +182,29 @@ impl Frame {
     /// background of one kind, and the sum of 1/depth over its moments (1/m). Returns `None` for
     /// other pixels.
     #[inline]
-    fn at_once(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> Option<(Vec3, f32)> {
+    fn at_once(&self, sample: usize, place: usize, length: f32, line: &mut Line<'_>) -> Option<(Vec3, f32)> {
         let inverse_depth = f32x4::from(self.lists.visibility.inverse_depth[sample]);
         match inverse_depth.simd_gt(f32x4::splat(0.0)).to_bitmask() {
             0 => {}
-            0b1111 => return Some(self.bodies((sample, place), inverse_depth, length, line)),
+            0b1111 => return Some(self.bodies(sample, place, inverse_depth, length, line)),
             _ => return None,
         }
         let x = (!matches!(line.background, Background::Mixed)).then(|| line.x(place))?;
         let lit =
             GroundLight { light: &self.light, patches: &line.effects.patches, left_px: line.columns[place] as f32 };
-        self.background(&line.background, (x, length), &lit, &mut line.background_noise)
+        self.background(&line.background, x, length, &lit, &mut line.background_noise)
     }
 
     /// Returns the mean radiance of a pixel that shows a body at each moment, and the sum of
     /// 1/depth over its moments (1/m).
     #[inline]
-    fn bodies(
-        &self,
-        (sample, place): (usize, usize),
-        inverse_depth: f32x4,
-        length: f32,
-        line: &Line<'_>,
-    ) -> (Vec3, f32) {
+    fn bodies(&self, sample: usize, place: usize, inverse_depth: f32x4, length: f32, line: &Line<'_>) -> (Vec3, f32) {
         let depth = f32x4::splat(1.0) / inverse_depth;
         let depths = depth.to_array();
         let faces = self.lists.visibility.face[sample];
         let mut of_moments = [[0.0; MOMENTS]; 3];
         for moment in 0..MOMENTS {
-            let radiance = self.of_face(faces[moment], (place, moment), depths[moment], line);
+            let radiance = self.of_face(faces[moment], place, moment, depths[moment], line);
             for (of_moments, part) in of_moments.iter_mut().zip(radiance) {
                 of_moments[moment] = part;
             }
@@ -222,7 +216,7 @@ impl Frame {
     /// Returns the radiance of a face at this depth (m), before the air, in the sample of a moment
     /// at a place of the row.
     #[inline]
-    fn of_face(&self, face: u32, (place, moment): (usize, usize), depth: f32, line: &Line<'_>) -> Vec3 {
+    fn of_face(&self, face: u32, place: usize, moment: usize, depth: f32, line: &Line<'_>) -> Vec3 {
         let shade = &self.lists.faces[face as usize];
         if shade.texture == Texture::Plain {
             return shade.radiance;
@@ -235,7 +229,7 @@ impl Frame {
     }
 
     /// Returns the mean radiance of a pixel, and the sum of 1/depth over its moments (1/m).
-    fn moment_by_moment(&self, (sample, place): (usize, usize), length: f32, line: &mut Line<'_>) -> (Vec3, f32) {
+    fn moment_by_moment(&self, sample: usize, place: usize, length: f32, line: &mut Line<'_>) -> (Vec3, f32) {
         let mut sum = [0.0; 3];
         let mut nearness = 0.0;
         for moment in 0..MOMENTS {
@@ -255,7 +249,7 @@ impl Frame {
         let inverse_depth = self.lists.visibility.inverse_depth[sample][moment];
         if inverse_depth > 0.0 {
             let depth = 1.0 / inverse_depth;
-            let radiance = self.of_face(self.lists.visibility.face[sample][moment], (place, moment), depth, line);
+            let radiance = self.of_face(self.lists.visibility.face[sample][moment], place, moment, depth, line);
             return (self.through_air(radiance, depth * length), inverse_depth);
         }
         let ray = line.ray(self, place, moment);

@@ -65,7 +65,7 @@ impl Frame {
         let sun = of_sun(fault.sun_glare, &self.lens, &self.light);
         let beams = nearest_behind(scene)
             .filter(|_| fault.main_beam_glare > 0.0 && self.light.is_dark())
-            .map(|vehicle| of_main_beams(fault.main_beam_glare, scene, vehicle, (&self.lens, &self.light)));
+            .map(|vehicle| of_main_beams(fault.main_beam_glare, scene, vehicle, &self.lens, &self.light));
         self.lists.veils.extend(sun.into_iter().chain(beams.into_iter().flatten()));
     }
 }
@@ -87,7 +87,8 @@ fn of_main_beams(
     strength: f64,
     scene: &Scene<'_>,
     vehicle: &SceneVehicle,
-    (lens, light): (&Lens, &Illumination),
+    lens: &Lens,
+    light: &Illumination,
 ) -> Vec<Veil> {
     let (at, heading) = lens.pose_in_ground(scene, vehicle);
     let (sin, cos) = maths::sin_cos(heading);

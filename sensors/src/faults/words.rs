@@ -77,19 +77,19 @@ impl Faults {
         let mut stated = Vec::new();
         if acting.has_models {
             match acting.has_front_lidar {
-                true => state(&mut stated, &self.front_lidar, (SensorGroup::Front, "front LiDAR")),
-                false => state(&mut stated, &self.front_radar, (SensorGroup::Front, "front radar")),
+                true => state(&mut stated, &self.front_lidar, SensorGroup::Front, "front LiDAR"),
+                false => state(&mut stated, &self.front_radar, SensorGroup::Front, "front radar"),
             }
-            state(&mut stated, &self.surround, (SensorGroup::Surround, "side sensors"));
+            state(&mut stated, &self.surround, SensorGroup::Surround, "side sensors");
             match acting.is_full {
                 true => {
-                    state(&mut stated, &self.rear_lidar, (SensorGroup::Rear, "rear LiDAR"));
-                    state(&mut stated, &self.rear_camera, (SensorGroup::Rear, "rear camera"));
+                    state(&mut stated, &self.rear_lidar, SensorGroup::Rear, "rear LiDAR");
+                    state(&mut stated, &self.rear_camera, SensorGroup::Rear, "rear camera");
                     if acting.has_rear_radar {
-                        state(&mut stated, &self.rear_radar, (SensorGroup::RearRadars, "rear radar"));
+                        state(&mut stated, &self.rear_radar, SensorGroup::RearRadars, "rear radar");
                     }
                 }
-                false => state(&mut stated, &self.rear_object, (SensorGroup::Rear, "rear sensor")),
+                false => state(&mut stated, &self.rear_object, SensorGroup::Rear, "rear sensor"),
             }
         }
         if !self.odometry.is_none() {
@@ -116,7 +116,7 @@ trait Effects {
 }
 
 /// Adds the entries of one sensor.
-fn state<T: Effects + Combine>(stated: &mut Vec<StatedFault>, list: &FaultList<T>, (group, name): (SensorGroup, &str)) {
+fn state<T: Effects + Combine>(stated: &mut Vec<StatedFault>, list: &FaultList<T>, group: SensorGroup, name: &str) {
     stated.extend(list.spans().map(|(effect, [from_s, until_s])| StatedFault {
         group,
         sensor: effect.of_sensor().map_or_else(|| name.to_owned(), |sensor| format!("{name} `{sensor}`")),

@@ -110,7 +110,7 @@ impl Detector {
         }
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
-            self.detections.push(detection(&self.fits[index], (hidden, self.is_pair[index]), scan.start, lane));
+            self.detections.push(detection(&self.fits[index], hidden, self.is_pair[index], scan.start, lane));
         }
         Ok(&self.detections)
     }
@@ -162,7 +162,7 @@ impl Detector {
         self.fit(scan, lane);
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
-            self.detections.push(detection(&self.fits[index], (hidden, false), scan.start, lane));
+            self.detections.push(detection(&self.fits[index], hidden, false, scan.start, lane));
         }
         Ok(&self.detections)
     }
@@ -299,7 +299,7 @@ fn occluded_edges(index: usize, fits: &[BoxFit]) -> [bool; 2] {
 
 /// Returns the detection for a fitted box. `hidden` tells whether its edge at the least and at the
 /// greatest azimuth is hidden, `is_pair` whether it surrounds a pair of headlamps.
-fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, lane: &LaneGeometry) -> Detection {
+fn detection(fit: &BoxFit, hidden: [bool; 2], is_pair: bool, start: Time, lane: &LaneGeometry) -> Detection {
     // Vehicles point in about the same direction as the ego: the edge at the least azimuth is also
     // that at the least v.
     let width_seen = !hidden[0] && !hidden[1];

@@ -34,7 +34,7 @@ impl Echo {
     /// Returns an echo of this power and moment, the sum of powers times ranges (thresholds · m).
     /// The strongest contribution gives the face, and the range of an echo without power.
     #[inline(always)]
-    fn of_sums(power: f32, moment: f32, (strongest_m, face): (f32, u32)) -> Self {
+    fn of_sums(power: f32, moment: f32, strongest_m: f32, face: u32) -> Self {
         Self { range_m: if power > 0.0 { moment / power } else { strongest_m }, power, face }
     }
 }
@@ -100,7 +100,7 @@ impl Echoes {
                 let (moment, power) = ((power * reached_m).to_array(), power.to_array());
                 let sum = |values: [f32; SUBRAYS]| values.into_iter().fold(0.0, |sum, value| sum + value);
                 let strongest_m = reached_m.to_array()[strongest];
-                self.list[0] = Echo::of_sums(sum(power), sum(moment), (strongest_m, hits.face[strongest]));
+                self.list[0] = Echo::of_sums(sum(power), sum(moment), strongest_m, hits.face[strongest]);
                 self.count = 1;
             }
             return;
@@ -229,7 +229,7 @@ fn sum(parts: impl Iterator<Item = Echo>) -> Echo {
             strongest = part;
         }
     }
-    Echo::of_sums(power, moment, (strongest.range_m, strongest.face))
+    Echo::of_sums(power, moment, strongest.range_m, strongest.face)
 }
 
 /// Returns the power that is received from sub-rays at the inverse range `per_range` (1/m).

@@ -61,8 +61,8 @@ pub(super) fn edges(fit: &BoxFit, heading: [f64; 2], members: &[u32], scan: &Lid
     let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / layers);
     let (first, last) = columns.fold((usize::MAX, 0), |(first, last), column| (first.min(column), last.max(column)));
     // The sweep begins on the left.
-    let right = edge_shift(fit, (-fit.across_m[0], -1.0), (heading, members), (last, scan))?;
-    let left = edge_shift(fit, (fit.across_m[1], 1.0), (heading, members), (first, scan))?;
+    let right = edge_shift(fit, -fit.across_m[0], -1.0, heading, members, last, scan)?;
+    let left = edge_shift(fit, fit.across_m[1], 1.0, heading, members, first, scan)?;
     // An edge within the outermost beam is known to half of its width; one beyond it lies anywhere
     // before the middle of the next beam.
     let half = 0.5 * fit.footprint_columns;
@@ -73,9 +73,12 @@ pub(super) fn edges(fit: &BoxFit, heading: [f64; 2], members: &[u32], scan: &Lid
 /// `outermost`.
 fn edge_shift(
     fit: &BoxFit,
-    (end_m, outward): (f64, f64),
-    ([sin, cos], members): ([f64; 2], &[u32]),
-    (outermost, scan): (usize, &LidarScan),
+    end_m: f64,
+    outward: f64,
+    [sin, cos]: [f64; 2],
+    members: &[u32],
+    outermost: usize,
+    scan: &LidarScan,
 ) -> Option<f64> {
     let layers = scan.resolution.layers;
     // For each layer: the powers in the outermost column and in the next column, and the place of

@@ -67,9 +67,9 @@ pub(crate) fn select_candidates(
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     let (slope, bend) = (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32);
     match &lane.course {
-        None => select(scan, (lane, |x: f32| (slope + bend * x) * x), time, candidates),
+        None => select(scan, lane, |x: f32| (slope + bend * x) * x, time, candidates),
         #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-        Some(course) => select(scan, (lane, |x: f32| course.y_m(x.into()) as f32), time, candidates),
+        Some(course) => select(scan, lane, |x: f32| course.y_m(x.into()) as f32, time, candidates),
     }
 }
 
@@ -77,7 +77,8 @@ pub(crate) fn select_candidates(
 /// longitudinal position.
 fn select(
     scan: &LidarScan,
-    (lane, path_y_m): (&LaneGeometry, impl Fn(f32) -> f32),
+    lane: &LaneGeometry,
+    path_y_m: impl Fn(f32) -> f32,
     time: Time,
     candidates: &mut Vec<Candidate>,
 ) -> Result<(), SensorError> {

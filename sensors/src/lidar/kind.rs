@@ -322,7 +322,10 @@ impl LidarKindConfig {
         let layers = self.layers_deg.len();
         let count = |value: usize, allowed| Problem::WrongCount { value: value as u64, allowed };
         if !(1..=MAX_LAYERS).contains(&layers) {
-            return Err(ConfigError::new("layers-deg", Problem::WrongLength { value: layers as u64, allowed: "1 to 128" }));
+            return Err(ConfigError::new(
+                "layers-deg",
+                Problem::WrongLength { value: layers as u64, allowed: "1 to 128" },
+            ));
         }
         for (index, pair) in self.layers_deg.windows(2).enumerate() {
             if !(pair[0] < pair[1]) {

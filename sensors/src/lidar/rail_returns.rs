@@ -76,7 +76,8 @@ impl RailReturns {
     pub(crate) fn are_discarded<S: Simd>(
         &self,
         simd: S,
-        (column, elevations): (&Column, &[Elevation]),
+        column: &Column,
+        elevations: &[Elevation],
         pose: &SensorPoseEstimate,
         parts: &[usize],
         targets: &Targets,

@@ -181,8 +181,11 @@ impl Receiver<'_> {
     pub(crate) fn receive<S: Simd>(
         &self,
         simd: S,
-        (hits, droplets, layers): (&ColumnHits, &ColumnDroplets, LayerMask),
-        (scan, truth): (&mut LidarScan, &mut ScanTruth),
+        hits: &ColumnHits,
+        droplets: &ColumnDroplets,
+        layers: LayerMask,
+        scan: &mut LidarScan,
+        truth: &mut ScanTruth,
     ) {
         let in_air = !self.plumes.is_empty() || self.air.link.has_fog();
         let are_noted = scan.echoes.are_noted;
@@ -223,7 +226,7 @@ impl Receiver<'_> {
         let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let centre = [cos, sin, self.elevations[layer].centre[0]];
         let at = BeamIndex { column: self.column_index, layer, layers: self.elevations.len() };
-        soft::droplet_effect(at, centre, self.plumes, (self.targets, &self.air))
+        soft::droplet_effect(at, centre, self.plumes, self.targets, &self.air)
     }
 
     /// Returns two numbers of beams, of the layers in a bit mask: the beams on which droplets may

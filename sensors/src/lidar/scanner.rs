@@ -197,7 +197,7 @@ impl Scanner {
         self.collect_targets(scene, mirror_side, &viewpoint);
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
         let link = LinkBudget::new(&actual, scene.environment);
-        self.begin(scene.time, mirror_side, (&pose, &link));
+        self.begin(scene.time, mirror_side, &pose, &link);
         // With a fault, a point may be elsewhere than its return. The limits hold for a sensor that
         // looks straight back along a straight road, whatever the map says.
         let is_plain = fault.is_none() && !self.lidar.is_turned() && scene.road.is_straight();
@@ -285,7 +285,7 @@ impl Scanner {
                 || omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(sweep.mirror_side, index), &road));
             let are_rails_discarded = || {
                 let are_discarded = |returns: RailReturns| {
-                    returns.are_discarded(simd, (column, elevations), &pose(), parts, &self.targets)
+                    returns.are_discarded(simd, column, elevations, &pose(), parts, &self.targets)
                 };
                 !self.active.has_rails() || sweep.rails.is_some_and(are_discarded)
             };
@@ -336,7 +336,7 @@ impl Scanner {
             }
             cast_ground(simd, (column, elevations), (&self.targets, &road), (omitted, wanted), &mut self.hits);
             let layers = self.hits.need_echoes() & wanted | self.droplets.detectable;
-            receiver.receive(simd, (&self.hits, &self.droplets, layers), (&mut self.scan, &mut self.truth));
+            receiver.receive(simd, &self.hits, &self.droplets, layers, &mut self.scan, &mut self.truth);
             if extent == Extent::UntilFirst && !self.scan.is_empty() {
                 return;
             }
@@ -355,7 +355,7 @@ impl Scanner {
     }
 
     /// Clears the scan and sets its times and its mirror side.
-    fn begin(&mut self, end: Time, mirror_side: MirrorSide, (pose, link): (&SensorPoseEstimate, &LinkBudget)) {
+    fn begin(&mut self, end: Time, mirror_side: MirrorSide, pose: &SensorPoseEstimate, link: &LinkBudget) {
         self.clear();
         self.stamp(end);
         self.scan.mirror_side = mirror_side;

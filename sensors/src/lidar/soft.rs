@@ -77,8 +77,10 @@ impl Plume {
     /// sensor's frame is given.
     #[expect(clippy::cast_possible_truncation, reason = "bounds of metres")]
     pub(crate) fn new(
-        (faces, columns): (FaceRange, Range<usize>),
-        (solid, pose): (&Solid, &Isometry3<f64>),
+        faces: FaceRange,
+        columns: Range<usize>,
+        solid: &Solid,
+        pose: &Isometry3<f64>,
         extinction_per_m: f32,
     ) -> Self {
         let corners = || solid.corners().map(|corner| pose * corner);
@@ -171,7 +173,8 @@ pub(crate) fn droplet_effect(
     at: BeamIndex,
     centre: [f32; 3],
     plumes: &[Plume],
-    (targets, air): (&Targets, &Air<'_>),
+    targets: &Targets,
+    air: &Air<'_>,
 ) -> DropletEffect {
     let Air { link, noise, .. } = *air;
     let beam = at.beam();

@@ -163,7 +163,7 @@ impl RoadMonitor {
 
     /// Notes the beams of a visit of a sector.
     pub(crate) fn observe(&mut self, sector: usize, beams: &[RoadBeam]) {
-        self.sectors[sector].visit((beams, self.returned_share), &mut self.blocked);
+        self.sectors[sector].visit(beams, self.returned_share, &mut self.blocked);
         let is_empty = beams.len() > 1 && !beams.iter().any(|beam| beam.has_returned);
         for beam in beams {
             self.returns.count(beam, is_empty);
@@ -202,7 +202,7 @@ impl Sector {
         *self = Self::default();
     }
 
-    fn visit(&mut self, (beams, returned_share): (&[RoadBeam], f64), blocked: &mut usize) {
+    fn visit(&mut self, beams: &[RoadBeam], returned_share: f64, blocked: &mut usize) {
         if beams.iter().any(|beam| beam.has_returned) {
             *blocked -= usize::from(self.is_blocked);
             self.forget();

@@ -222,7 +222,8 @@ impl Faulty {
     pub(super) fn ghost(
         &mut self,
         is_ahead: bool,
-        (source, input): (Source, &ScanInput<'_>),
+        source: Source,
+        input: &ScanInput<'_>,
         list: &mut TrackList,
     ) -> Option<Track> {
         let [gap_m, closing_mps] = self.fault.ghost?;

@@ -221,7 +221,7 @@ impl ObjectSensor {
             return;
         }
         self.faulty.hold(before, input.scene.time, list);
-        let track = self.faulty.ghost(self.direction == Direction::Ahead, (self.source, input), list);
+        let track = self.faulty.ghost(self.direction == Direction::Ahead, self.source, input, list);
         list.tracks.extend(track);
     }
 

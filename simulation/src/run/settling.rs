@@ -16,7 +16,8 @@ const SCANS_BEFORE_START: i64 = 25;
 pub(super) fn settle_sensors(
     perception: &mut dyn Perception,
     scenario: &Scenario,
-    (ego, others): (SceneVehicle, &[SceneVehicle]),
+    ego: SceneVehicle,
+    others: &[SceneVehicle],
     observer: &mut dyn Observer,
 ) -> Result<(), SensorError> {
     let mut others_before = others.to_vec();

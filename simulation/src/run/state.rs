@@ -167,7 +167,7 @@ impl<'a> Run<'a> {
         };
         run.collect_vehicles();
         let ego = run.vehicles[run.scenario.ego];
-        settle_sensors(run.perception.as_mut(), &run.scenario, (ego, &run.others), observer)?;
+        settle_sensors(run.perception.as_mut(), &run.scenario, ego, &run.others, observer)?;
         Ok(run)
     }
 

@@ -63,7 +63,7 @@ pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
         sample: case.sample,
         controller: case.arm.controller.name().to_owned(),
         sensors: sensors.name().to_owned(),
-        happened: causal_sentence(&scenario, (case.arm.sensors, case.arm.goal_s(&scenario)), &outcome),
+        happened: causal_sentence(&scenario, case.arm.sensors, case.arm.goal_s(&scenario), &outcome),
         collision,
         stages,
         missing,

@@ -61,7 +61,7 @@ fn observe_ego(data: &SmoothedTrajectoryData, ego: usize, rule: EventRule, into:
     // The rear vehicle that is near, by the index of its track.
     let mut near = None;
     for point in &trajectory.points {
-        let Some((lead, rear)) = neighbours(data, ego, (trajectory, point)) else {
+        let Some((lead, rear)) = neighbours(data, ego, trajectory, point) else {
             near = None;
             continue;
         };
@@ -107,7 +107,8 @@ struct Neighbour<'a> {
 fn neighbours<'a>(
     data: &'a SmoothedTrajectoryData,
     ego: usize,
-    (trajectory, point): (&Trajectory, &TrajectoryPoint),
+    trajectory: &Trajectory,
+    point: &TrajectoryPoint,
 ) -> Option<(Neighbour<'a>, Neighbour<'a>)> {
     let (mut ahead, mut behind) = (None::<Neighbour<'a>>, None::<Neighbour<'a>>);
     for &presence in data.present_at(point.time).iter().filter(|presence| presence.track_index != ego) {

@@ -41,7 +41,7 @@ pub fn panel(map: &Map, front_thw_s: f64) -> String {
                 p.front_thw_s == front_thw_s && p.detection_m == detection_m && p.closing_kmh == closing_kmh
             };
             if let Some(point) = map.points.iter().find(is_here) {
-                cell(&mut svg, map, point, ([LEFT + column as f64 * cell_px, y], cell_px));
+                cell(&mut svg, map, point, [LEFT + column as f64 * cell_px, y], cell_px);
             }
         }
     }
@@ -96,7 +96,7 @@ fn cell_width(lines: &[&str], bands: &[Band], columns: f64) -> f64 {
 }
 
 /// Draws a cell at this place, with this width (px).
-fn cell(svg: &mut String, map: &Map, point: &MapPoint, ([x, y], width): ([f64; 2], f64)) {
+fn cell(svg: &mut String, map: &Map, point: &MapPoint, [x, y]: [f64; 2], width: f64) {
     let share = point.loop_s.map_or(0.0, |s| (s / map.goal_s).clamp(0.0, 1.0));
     // From white to green. A point in time has a dark frame.
     let channel = |from: f64, to: f64| (from + share * (to - from)).round();

@@ -200,7 +200,7 @@ fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candid
     // The other parameters have moved since then: the boundary of each is sought again.
     let candidates = names.iter().filter_map(|name| {
         let (failing, next) = boundary(trial, &values, name)?;
-        let passing = first_passing(trial, &values, name, (&failing, next))?;
+        let passing = first_passing(trial, &values, name, &failing, next)?;
         let distance = match (&failing, &passing, trial.span(name)) {
             (Value::Number(failing), Value::Number(passing), Some(span)) => (failing - passing).abs() / span,
             _ => 1.0,
@@ -218,7 +218,8 @@ fn first_passing(
     trial: &Trial<'_>,
     values: &Parameters,
     name: &ParameterName,
-    (failing, next): (&Value, Value),
+    failing: &Value,
+    next: Value,
 ) -> Option<Value> {
     let steps = match (failing, &next, trial.span(name)) {
         (Value::Number(failing), Value::Number(next), Some(span)) => {

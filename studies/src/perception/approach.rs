@@ -172,12 +172,13 @@ fn drive(case: &Case, sensors: &Sensors, road: &Road, at: Address, rng: &mut Str
     // vehicle.
     let start_m = GAPS_M[0] + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
     let traffic = Traffic::new(case, road, start_m, closing_mps);
-    observe((case, road), traffic, &mut *build(sensors, at)?)
+    observe(case, road, traffic, &mut *build(sensors, at)?)
 }
 
 /// Observes an approach of these vehicles with this perception.
 fn observe(
-    (case, road): (&Case, &Road),
+    case: &Case,
+    road: &Road,
     mut traffic: Traffic,
     perception: &mut dyn Perception,
 ) -> Result<Approach, SensorError> {

@@ -184,7 +184,7 @@ impl RecordedInput<'_> {
         let TakenScan { sensor, origin, points } = scan;
         let (road, ego) = self.poses.place_at(points.end, &self.road, self.lane_d_m)?;
         let count = points.len() as u64;
-        let outside = self.perception.take(sensor, points, (&road, ego)).map_err(|error| match error {
+        let outside = self.perception.take(sensor, points, &road, ego).map_err(|error| match error {
             RecordedScanError::Point(error) => origin.error(error).into(),
             RecordedScanError::Sensor(error) => RecordedStudyError::Sensor(error),
         })?;

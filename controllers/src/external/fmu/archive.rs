@@ -245,7 +245,7 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
     for (name, index) in &entries {
         let mut entry = archive.by_index(*index).map_err(broken)?;
         let target = folder.path.join(name);
-        let file = write_file(&mut entry, &target, (&mut left, started)).map_err(|error| match error.kind() {
+        let file = write_file(&mut entry, &target, &mut left, started).map_err(|error| match error.kind() {
             // The content is compressed in another way than its header says.
             io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
                 refuse(format!("its archive is damaged in `{name}`: {error}"))
@@ -268,19 +268,19 @@ fn unpack_into_new(path: &Path) -> Result<Unpacked, LoadError> {
 
 /// Writes a file of an archive, and the folders above it. `left` is the number of bytes that may
 /// still be written.
-fn write_file(from: &mut impl Read, target: &Path, (left, started): (&mut u64, Instant)) -> io::Result<File> {
+fn write_file(from: &mut impl Read, target: &Path, left: &mut u64, started: Instant) -> io::Result<File> {
     // Empty files and folders take time, too.
     check_time(started)?;
     if let Some(parent) = target.parent() {
         std::fs::create_dir_all(parent)?;
     }
     let mut file = File::create(target)?;
-    copy_bounded(from, &mut file, (left, started))?;
+    copy_bounded(from, &mut file, left, started)?;
     Ok(file)
 }
 
 /// Copies a file of an archive. `left` is the number of bytes that may still be written.
-fn copy_bounded(from: &mut impl Read, to: &mut impl Write, (left, started): (&mut u64, Instant)) -> io::Result<()> {
+fn copy_bounded(from: &mut impl Read, to: &mut impl Write, left: &mut u64, started: Instant) -> io::Result<()> {
     const CHUNK_BYTES: usize = 1 << 16;
     let mut chunk = vec![0; CHUNK_BYTES];
     loop {
@@ -398,9 +398,9 @@ mod tests {
     #[test]
     fn the_unpacked_size_is_bounded() {
         let (mut left, mut written) = (10, Vec::new());
-        let error = copy_bounded(&mut [0; 11].as_slice(), &mut written, (&mut left, Instant::now())).unwrap_err();
+        let error = copy_bounded(&mut [0; 11].as_slice(), &mut written, &mut left, Instant::now()).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
-        copy_bounded(&mut [0; 10].as_slice(), &mut written, (&mut left, Instant::now())).unwrap();
+        copy_bounded(&mut [0; 10].as_slice(), &mut written, &mut left, Instant::now()).unwrap();
         assert_eq!((left, written.len()), (0, 10));
     }
 
@@ -409,11 +409,11 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("resources/deep/empty");
         let (mut left, long_ago) = (10, Instant::now().checked_sub(LONGEST + Duration::from_secs(1)).unwrap());
-        let error = write_file(&mut io::empty(), &target, (&mut left, long_ago)).unwrap_err();
+        let error = write_file(&mut io::empty(), &target, &mut left, long_ago).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::TimedOut);
         assert!(error.to_string().contains("longer to unpack than the 60 s allowed"), "{error}");
         assert!(!place.path().join("resources").exists());
-        write_file(&mut io::empty(), &target, (&mut left, Instant::now())).unwrap();
+        write_file(&mut io::empty(), &target, &mut left, Instant::now()).unwrap();
         assert!(target.is_file());
     }
 

@@ -65,7 +65,7 @@ pub fn encounter(films: &[Film]) -> String {
         let style = |size, anchor| TextStyle { size, colour: INK, anchor };
         svg.text([LEFT - 12.0, top + 0.5 * STRIP_HEIGHT + 4.0], &format!("({letter})"), style(14.0, Anchor::End));
         svg.text([LEFT, top - 5.0], &format!("{:.2} s: {text}", time.s()), style(11.0, Anchor::Start));
-        strip::draw(&mut svg, (film, other), frame_index, (area, REACH_M));
+        strip::draw(&mut svg, film, other, frame_index, area, REACH_M);
         if index + 1 == count {
             strip::scale(&mut svg, area, REACH_M);
         }

@@ -61,7 +61,7 @@ pub fn still(film: &Film) -> String {
     for (line, at, style) in lines {
         svg.text(at, &line, style);
     }
-    strip::draw(&mut svg, (film, None), frame_index, (strip_area, REACH_M));
+    strip::draw(&mut svg, film, None, frame_index, strip_area, REACH_M);
     let start = film.frames.first().map_or(0.0, |frame| frame.time.s());
     let curve = |name: &str, colour, vehicle: fn(&Frame) -> Option<usize>, value: fn(&Frame) -> Option<f64>| Curve {
         name: name.to_owned(),

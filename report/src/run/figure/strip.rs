@@ -51,12 +51,7 @@ struct Strip<'a> {
 
 /// Draws the frame `frame_index` into `area`. The vehicles of `other`, another film of the same
 /// sample, appear as outlines.
-pub(super) fn draw(
-    svg: &mut Svg,
-    (film, other): (&Film, Option<&Film>),
-    frame_index: usize,
-    (area, reach): (Area, Reach),
-) {
+pub(super) fn draw(svg: &mut Svg, film: &Film, other: Option<&Film>, frame_index: usize, area: Area, reach: Reach) {
     let Some(frame) = film.frames.get(frame_index) else { return };
     let strip = Strip { film, frame, area, reach };
     svg.rect(area, ASPHALT);

@@ -138,7 +138,7 @@ fn a_vehicle_outside_of_the_picture_has_no_label() {
     let drawn = |rear_end_m: f64| {
         let mut svg = svg::Svg::new([560.0, 330.0]);
         let area = svg::Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };
-        strip::draw(&mut svg, (film, None), 0, (area, [rear_end_m, 75.0]));
+        strip::draw(&mut svg, film, None, 0, area, [rear_end_m, 75.0]);
         svg.finish()
     };
     let [within, beyond] = [drawn(ahead_m - 20.0), drawn(ahead_m + 20.0)];
@@ -158,7 +158,7 @@ fn a_vehicle_in_the_left_lane_has_its_label_beside_it_if_there_is_room_nowhere_e
     (states[lead].s_m, states[rear].s_m, states[rear].d_m) = (ego.s_m + 20.0, ego.s_m + 24.0, left_m);
     let mut svg = svg::Svg::new([360.0, 120.0]);
     let area = svg::Area { left: 8.0, top: 8.0, width: 344.0, height: 100.0 };
-    strip::draw(&mut svg, (&*film, None), 0, (area, [-38.0, 70.0]));
+    strip::draw(&mut svg, &*film, None, 0, area, [-38.0, 70.0]);
     let text = svg.finish();
     assert!(text.contains(">F front ") && text.contains(">R rear "), "{text}");
 }
@@ -194,7 +194,7 @@ fn a_still_is_narrow_enough_for_a_phone_and_names_a_vehicle_of_the_background_th
     let drawn = |film: &Film| {
         let mut svg = svg::Svg::new([560.0, 330.0]);
         let area = svg::Area { left: 10.0, top: 46.0, width: 540.0, height: 96.0 };
-        strip::draw(&mut svg, (film, None), index, (area, [-65.0, 75.0]));
+        strip::draw(&mut svg, film, None, index, area, [-65.0, 75.0]);
         svg.finish()
     };
     let label = format!(">{name} ");

@@ -37,16 +37,16 @@ pub(crate) fn timeline(films: &[Film]) -> Markup {
             figure {
                 svg viewBox={ "0 0 " (WIDTH_PX) " " (HEIGHT_PX) } role="img" aria-label={ "Timeline, " (film.arm_label()) } font-size="11" {
                     @for (state, from_s, until_s) in states(film) {
-                        (axis.band((from_s, until_s, STATES_PX), ego_state_name(state), [band_colour(state), "#ffffff"]))
+                        (axis.band(from_s, until_s, STATES_PX, ego_state_name(state), [band_colour(state), "#ffffff"]))
                     }
                     @for (index, (reason, from_s, until_s)) in reasons(film).into_iter().enumerate() {
-                        (axis.band((from_s, until_s, REASONS_PX), &reason, [if index % 2 == 0 { REASON } else { OTHER_REASON }, "#222222"]))
+                        (axis.band(from_s, until_s, REASONS_PX, &reason, [if index % 2 == 0 { REASON } else { OTHER_REASON }, "#222222"]))
                     }
                     @for noted in film.moments() {
-                        (axis.mark(noted.time, ("#55606d", 1), noted.moment.letter().map_or("·".to_owned(), String::from), &film.letters.moment_label(noted)))
+                        (axis.mark(noted.time, "#55606d", 1, noted.moment.letter().map_or("·".to_owned(), String::from), &film.letters.moment_label(noted)))
                     }
                     @for collision in film.collisions() {
-                        (axis.mark(collision.time, (COLLISION, 2), "!".to_owned(), "collision"))
+                        (axis.mark(collision.time, COLLISION, 2, "!".to_owned(), "collision"))
                     }
                 }
                 figcaption {
@@ -74,7 +74,7 @@ impl Axis {
 
     /// Returns a band with its text, if the text has room. The colours belong to the band and to
     /// the text.
-    fn band(&self, (from_s, until_s, top_px): (f64, f64, f64), text: &str, [fill, ink]: [&str; 2]) -> Markup {
+    fn band(&self, from_s: f64, until_s: f64, top_px: f64, text: &str, [fill, ink]: [&str; 2]) -> Markup {
         let (left, width) = (self.x(from_s), self.x(until_s) - self.x(from_s));
         let has_room = LETTER_PX * text.chars().count() as f64 + 8.0 < width;
         html! {
@@ -85,7 +85,7 @@ impl Axis {
         }
     }
 
-    fn mark(&self, time: Time, (colour, width): (&str, u8), letter: String, text: &str) -> Markup {
+    fn mark(&self, time: Time, colour: &str, width: u8, letter: String, text: &str) -> Markup {
         let x = format!("{:.1}", self.x(time.s()));
         html! {
             line x1=(x) x2=(x) y1="0" y2=(MOMENTS_PX) stroke=(colour) stroke-width=(width) {}

@@ -153,7 +153,7 @@ fn verdict() -> Node {
 fn scenes(films: &[FilmContents]) -> Option<Node> {
     let scenes: Vec<(f32, Node)> = films.iter().filter(|film| film.has_scene).map(|film| (1.0, scene(film))).collect();
     let camera_of = |film: &FilmContents| {
-        let view = |pictures: &Pictures| camera(titled(&pictures.title, films, film), (film, pictures));
+        let view = |pictures: &Pictures| camera(titled(&pictures.title, films, film), film, pictures);
         tabs(film.cameras.iter().map(view).collect()).map(|node| (1.0, node))
     };
     let cameras: Vec<(f32, Node)> = films.iter().filter_map(camera_of).collect();
@@ -172,7 +172,7 @@ fn scenes(films: &[FilmContents]) -> Option<Node> {
 
 /// Returns the view of the pictures of a rear camera, with the strip above them that has the
 /// labels.
-fn camera(title: String, (film, pictures): (&FilmContents, &Pictures)) -> Node {
+fn camera(title: String, film: &FilmContents, pictures: &Pictures) -> Node {
     let [width_px, height_px] = pictures.size_px;
     let bounds = Range2D { x_range: [0.0, width_px].into(), y_range: [-STRIP_PX, height_px].into() };
     let strip = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);

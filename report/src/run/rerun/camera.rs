@@ -89,7 +89,7 @@ impl Shown {
 
 /// Writes position and projection of the camera, so that the scene shows its image where it is
 /// taken. The pitch of the body is left out.
-fn write_pinhole(writer: &Writer<'_>, film: &Film, (entity, camera): (&str, &Camera)) -> Result<(), RecordingError> {
+fn write_pinhole(writer: &Writer<'_>, film: &Film, entity: &str, camera: &Camera) -> Result<(), RecordingError> {
     let ahead_m = camera.mount_from_rear_m - 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let axes = axes(camera).map(|axis| axis.map(|value| value as f32));
     let position_m = [ahead_m as f32, camera.left_m as f32, camera.mount_height_m as f32];
@@ -136,7 +136,7 @@ fn write_camera(writer: &Writer<'_>, film: &Film, number: usize) -> Result<Optio
         0 => ("Rear camera".to_owned(), ENTITY.to_owned()),
         _ => (format!("Rear camera {}", camera.name), format!("{ENTITY}s/{}", camera.name)),
     };
-    write_pinhole(writer, film, (&entity, camera))?;
+    write_pinhole(writer, film, &entity, camera)?;
     let exposures = rear_exposures(key, (number, camera));
     let camera = RearCamera::new(*camera);
     let is_whole = camera.camera().pipeline == Pipeline::MaskRcnn;

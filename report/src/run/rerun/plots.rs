@@ -209,7 +209,8 @@ impl Plots<'_> {
         &self,
         entity: &str,
         style: &CurveStyle<'_>,
-        (vehicle, value): (Of<usize>, Of<f64>),
+        vehicle: Of<usize>,
+        value: Of<f64>,
     ) -> Result<bool, RecordingError> {
         let frames = self.film.frames.iter().map(|frame| (vehicle(frame), value(frame)));
         self.series(entity, style, &interrupted(frames))
@@ -318,10 +319,10 @@ impl Plots<'_> {
     fn headways(&self) -> Result<bool, RecordingError> {
         let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
         let front =
-            self.curve_about("plots/headway/front", &front, (Frame::lead, |frame| frame.margins.thw_front_s.ok()))?;
+            self.curve_about("plots/headway/front", &front, Frame::lead, |frame| frame.margins.thw_front_s.ok())?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
         let rear =
-            self.curve_about("plots/headway/rear", &rear, (Frame::follower, |frame| frame.margins.thw_rear_s.ok()))?;
+            self.curve_about("plots/headway/rear", &rear, Frame::follower, |frame| frame.margins.thw_rear_s.ok())?;
         if front || rear {
             self.level("plots/headway/critical", "0.9 s", CRITICAL_THW_S)?;
         }
@@ -331,11 +332,9 @@ impl Plots<'_> {
     /// Writes the gaps in front of and behind the ego, and the rear gap as the MIS estimates it.
     fn gaps(&self) -> Result<bool, RecordingError> {
         let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
-        let front =
-            self.curve_about("plots/gap/front", &front, (Frame::lead, |frame| frame.margins.gap_front_m.ok()))?;
+        let front = self.curve_about("plots/gap/front", &front, Frame::lead, |frame| frame.margins.gap_front_m.ok())?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
-        let rear =
-            self.curve_about("plots/gap/rear", &rear, (Frame::follower, |frame| frame.margins.gap_rear_m.ok()))?;
+        let rear = self.curve_about("plots/gap/rear", &rear, Frame::follower, |frame| frame.margins.gap_rear_m.ok())?;
         let style = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         let perceived = self.curve("plots/gap/rear_seen", &style, |frame| Some(plan(frame)?.rear_gap_m))?;
         Ok(front || rear || perceived)
@@ -344,7 +343,7 @@ impl Plots<'_> {
     /// Writes the time to collision of the vehicle behind the ego.
     fn time_to_collision(&self) -> Result<bool, RecordingError> {
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
-        self.curve_about("plots/ttc/rear", &rear, (Frame::follower, |frame| frame.margins.ttc_rear_s.ok()))
+        self.curve_about("plots/ttc/rear", &rear, Frame::follower, |frame| frame.margins.ttc_rear_s.ok())
     }
 
     /// Writes the next closest encounter at the present velocities, in the ground truth and as the

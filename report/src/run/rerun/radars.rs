@@ -43,7 +43,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let times: Vec<Time> = scans.iter().map(|(time, _)| *time).collect();
     for (index, entity) in ENTITIES.into_iter().enumerate() {
         let of_radar: Vec<&[RadarReturn]> = scans.iter().map(|(_, returns)| &returns[index][..]).collect();
-        write_radar(writer, film, entity, (&times, &of_radar))?;
+        write_radar(writer, film, entity, &times, &of_radar)?;
     }
     Ok(())
 }
@@ -53,7 +53,8 @@ fn write_radar(
     writer: &Writer<'_>,
     film: &Film,
     entity: &str,
-    (times, scans): (&[Time], &[&[RadarReturn]]),
+    times: &[Time],
+    scans: &[&[RadarReturn]],
 ) -> Result<(), RecordingError> {
     writer.write_static(entity, &Points3D::update_fields().with_radii([RADIUS_M]).with_show_labels(false))?;
     writer.write_rows(entity, times, |range| {

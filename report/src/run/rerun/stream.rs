@@ -65,8 +65,10 @@ impl<'a> Writer<'a> {
     pub(super) fn new(
         recording: &'a Recording,
         film: &Film,
-        (root, is_alone): (&str, bool),
-        (span, critical): ([Time; 2], Time),
+        root: &str,
+        is_alone: bool,
+        span: [Time; 2],
+        critical: Time,
     ) -> Self {
         Self { recording, critical, root: root.to_owned(), is_alone, period: film.period, span }
     }

@@ -65,14 +65,16 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     for (name, colour, shapes_of) in layers {
         let shapes: Vec<&Vec<Shape>> = comparisons.iter().map(shapes_of).collect();
         let label = (name == "false_tracks").then_some(NO_VEHICLE);
-        write_layer(writer, (&format!("world/ego/truth/{name}"), colour, label), &times, &shapes)?;
+        write_layer(writer, &format!("world/ego/truth/{name}"), colour, label, &times, &shapes)?;
     }
     Ok(vec!["world/ego/truth/known".to_owned()])
 }
 
 fn write_layer(
     writer: &Writer<'_>,
-    (entity, colour, label): (&str, Rgba, Option<&str>),
+    entity: &str,
+    colour: Rgba,
+    label: Option<&str>,
     times: &[Time],
     shapes: &[&Vec<Shape>],
 ) -> Result<(), RecordingError> {

@@ -77,16 +77,16 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         }
         write_motion(writer, &entity, times, &states, &film.road)?;
         if film.is_main(index) {
-            write_velocity(writer, &entity, times, &states, (size, colour))?;
+            write_velocity(writer, &entity, times, &states, size, colour)?;
             let above_m = size.height_m + label_above_m(actor.part);
             let at_m = if index == film.ego { EGO_LABEL_AT_M } else { [0.0, 0.0, above_m as f32] };
             // Dense recorded traffic has room for three names. The view from above has the others.
             if film.outcome.is_some() || !matches!(actor.part, Part::Other(_)) {
                 let texts = names(film, index, writer.is_alone);
-                write_name(writer, &entity, times, &texts, (at_m, colour))?;
+                write_name(writer, &entity, times, &texts, at_m, colour)?;
             }
         }
-        write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
+        write_lights(writer, &entity, times, &states, actor.vehicle.class, size)?;
         if let Some(&gone) = all_times.get(actor.present_frames.end) {
             writer.write_clear(&entity, gone)?;
         }
@@ -153,7 +153,8 @@ fn write_velocity(
     entity: &str,
     times: &[Time],
     states: &[&VehicleState],
-    (size, colour): (&Dimensions, Rgba),
+    size: &Dimensions,
+    colour: Rgba,
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/velocity");
     let above_m = (size.height_m + ARROW_ABOVE_M) as f32;
@@ -192,7 +193,8 @@ fn write_name(
     entity: &str,
     times: &[Time],
     texts: &[String],
-    (at_m, colour): ([f32; 3], Rgba),
+    at_m: [f32; 3],
+    colour: Rgba,
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
     let fixed = Points3D::new([at_m]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(false);
@@ -211,7 +213,8 @@ fn write_lights(
     entity: &str,
     times: &[Time],
     states: &[&VehicleState],
-    (class, size): (VehicleClass, &Dimensions),
+    class: VehicleClass,
+    size: &Dimensions,
 ) -> Result<(), RecordingError> {
     let (rear_m, front_m) = (-0.5 * size.length_m, 0.5 * size.length_m);
     // A motorcycle has one brake light in the middle; the other vehicles have two at the corners.

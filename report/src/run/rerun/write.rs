@@ -89,8 +89,8 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
             _ => Role::Tested,
         };
         let root = format!("{}/", film.arm);
-        let writer = Writer::new(&recording, film, (&root, films.len() == 1), (span, shown));
-        contents.push(write_film(&writer, &canvases[index], (root, role))?);
+        let writer = Writer::new(&recording, film, &root, films.len() == 1, span, shown);
+        contents.push(write_film(&writer, &canvases[index], root, role)?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, &canvases[index], ghosts)?;
         }
@@ -128,7 +128,8 @@ fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
 fn write_film(
     writer: &Writer<'_>,
     canvas: &bird::Canvas<'_>,
-    (root, role): (String, Role),
+    root: String,
+    role: Role,
 ) -> Result<FilmContents, RecordingError> {
     let film = canvas.film;
     let light = film.environment.light;

@@ -47,9 +47,9 @@ fn compared(road: &Road, environment: &Environment, heading_rad: f64, yaw_deg: f
         line.begin(&frame, row, &effects);
         for (place, column) in columns.iter().enumerate() {
             let (_, length) = line.centre(&frame, place);
-            let singly = frame.moment_by_moment((place, place), length, &mut line);
+            let singly = frame.moment_by_moment(place, place, length, &mut line);
             counts[2] += 1;
-            if let Some(at_once) = frame.at_once((place, place), length, &mut line) {
+            if let Some(at_once) = frame.at_once(place, place, length, &mut line) {
                 counts[0] += 1;
                 counts[1] += usize::from(frame.instance(place) > 0);
                 assert_eq!(bits(at_once), bits(singly), "row {row}, column {column}");

@@ -27,10 +27,10 @@ impl Scanner {
         self.targets.push_ground(&view.sensor_from_plane(0.0), surface);
         self.note_rest();
         if scene.road.has_guard_rails() {
-            self.collect_along_road((scene, PointSource::GuardRail), mirror_side, view);
+            self.collect_along_road(scene, PointSource::GuardRail, mirror_side, view);
         }
         if *scene.road.roadside() != Roadside::default() {
-            self.collect_along_road((scene, PointSource::Roadside), mirror_side, view);
+            self.collect_along_road(scene, PointSource::Roadside, mirror_side, view);
         }
         self.collect_plume(&scene.ego, scene, view);
         for other in scene.others {
@@ -42,7 +42,8 @@ impl Scanner {
     /// Collects the guard rails, or the other things along the road.
     fn collect_along_road(
         &mut self,
-        (scene, source): (&Scene<'_>, PointSource),
+        scene: &Scene<'_>,
+        source: PointSource,
         mirror_side: MirrorSide,
         view: &Viewpoint,
     ) {
@@ -112,7 +113,7 @@ impl Scanner {
         let surface = Surface { source: PointSource::Spray, reflectivity: &water };
         let columns = Targets::columns_of(self.pattern, &solid, &placed);
         let faces = self.targets.push_faces(&solid, &placed, surface);
-        self.plumes.push(Plume::new((faces, columns), (&solid, &placed), extinction_per_m));
+        self.plumes.push(Plume::new(faces, columns, &solid, &placed, extinction_per_m));
         self.note_rest();
     }
 

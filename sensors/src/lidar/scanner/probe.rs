@@ -102,7 +102,7 @@ impl Scanner {
             }
             cast_ground(simd, (column, elevations), (&self.targets, &road), (None, wanted), &mut self.hits);
             let layers = self.hits.need_echoes() & wanted;
-            receiver.receive(simd, (&self.hits, &self.droplets, layers), (&mut self.scan, &mut self.truth));
+            receiver.receive(simd, &self.hits, &self.droplets, layers, &mut self.scan, &mut self.truth);
         }
     }
 
@@ -158,7 +158,7 @@ impl Scanner {
         // Of several echoes, the first may be missed.
         let only = if let [echo] = echoes.as_slice() { Some(echo) } else { None };
         let height = match (only, returned) {
-            (Some(echo), Some(point)) => self.road_height(sweep, (at, echo), (point, expected.1)),
+            (Some(echo), Some(point)) => self.road_height(sweep, at, echo, point, expected.1),
             _ => None,
         };
         let kept = 1.0 - self.lidar.dropout;
@@ -171,8 +171,10 @@ impl Scanner {
     fn road_height(
         &self,
         sweep: &Sweep,
-        ([column, layer], echo): ([usize; 2], &Echo),
-        (point, faultless): (usize, &LinkBudget),
+        [column, layer]: [usize; 2],
+        echo: &Echo,
+        point: usize,
+        faultless: &LinkBudget,
     ) -> Option<RoadHeight> {
         let elevation = &self.pattern.elevations(sweep.mirror_side, column)[layer];
         let [cos, sin] = self.pattern.columns[column].centre[elevation.group];

@@ -85,7 +85,7 @@ fn a_forced_change_of_the_id_and_a_forced_false_track_are_counted() {
     assert_eq!(case.environment, Environment::CLEAR_DAY);
     let with_class = |class| {
         let traffic = Traffic::new(&case, &road, 150.0, 10.0);
-        observe((&case, &road), traffic, &mut Scripted { step: 0, class, tracks: Vec::new() }).unwrap()
+        observe(&case, &road, traffic, &mut Scripted { step: 0, class, tracks: Vec::new() }).unwrap()
     };
     let approach = with_class(ClassScores::certain(VehicleClass::Car));
     assert_eq!((approach.id_switches, approach.false_tracks, approach.failed_steps), (1, 1, 0));

@@ -95,7 +95,8 @@ fn seen(track: &Track, traffic: &Traffic) -> Seen {
 /// Returns the confirmed track of the vehicle in the next step.
 fn track_of<'a>(
     perception: &'a mut dyn Perception,
-    (case, road): (&Case, &Road),
+    case: &Case,
+    road: &Road,
     traffic: &Traffic,
     step: i64,
 ) -> Result<Option<&'a Track>, SensorError> {
@@ -122,7 +123,7 @@ pub(crate) fn delays(case: &Case, sensors: &Sensors, road: &Road, at: Address) -
             traffic.others.clone_from(&vehicles);
             traffic.others[0].state.s_m += travelled_m;
         }
-        if let Some(track) = track_of(perception.as_mut(), (case, road), &traffic, step)? {
+        if let Some(track) = track_of(perception.as_mut(), case, road, &traffic, step)? {
             let since_s = Some((CONTROL_STEP * (step - appears)).s());
             delays.confirmed_s = delays.confirmed_s.or(since_s);
             if track.existence >= 0.5 && track.class.is_vehicle() {
@@ -154,7 +155,7 @@ pub(crate) fn lags_s(
     let start_d_m = traffic.others[0].state.d_m;
     let before = BEFORE_MANOEUVRE_STEPS + i64::try_from(at.run).unwrap_or(0) % PHASES;
     for step in 0..before + MANOEUVRE_STEPS {
-        let track = track_of(perception.as_mut(), (case, road), &traffic, step)?.map(|track| seen(track, &traffic));
+        let track = track_of(perception.as_mut(), case, road, &traffic, step)?.map(|track| seen(track, &traffic));
         let state = &mut traffic.others[0].state;
         match track {
             Some(seen) if step < before => at_rest.push([-seen.errors[2], seen.errors[1]]),

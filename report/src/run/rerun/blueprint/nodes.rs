@@ -126,9 +126,9 @@ impl NodeWriter<'_> {
         let number = self.count;
         match node {
             Node::View(view) => self.write_view(number, view)?,
-            Node::Container(kind, nodes) => self.write_container(number, (kind, None), nodes)?,
+            Node::Container(kind, nodes) => self.write_container(number, kind, None, nodes)?,
             Node::Named(name, node) => match *node {
-                Node::Container(kind, nodes) => self.write_container(number, (kind, Some(name)), nodes)?,
+                Node::Container(kind, nodes) => self.write_container(number, kind, Some(name), nodes)?,
                 // Only containers are named.
                 other => return self.write(other),
             },
@@ -150,7 +150,8 @@ impl NodeWriter<'_> {
     fn write_container(
         &mut self,
         number: u64,
-        (kind, name): (ContainerKind, Option<&str>),
+        kind: ContainerKind,
+        name: Option<&str>,
         nodes: Vec<(f32, Node)>,
     ) -> Result<(), RecordingError> {
         let shares: Vec<f32> = nodes.iter().map(|(share, _)| *share).collect();

@@ -31,7 +31,7 @@ fn library(name: &str) -> ScenarioFile {
 }
 
 /// Returns the film of one sample of a library scenario.
-fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<SensorMode>, Level)) -> Film {
+fn filmed(name: &str, controller: ControllerChoice, sensors: Option<SensorMode>, level: Level) -> Film {
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
     let scenario = concrete(&library(name), sampling, 0).unwrap();
     let arm = Arm { controller: controller.factory(), sensors };
@@ -42,7 +42,7 @@ fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<Se
 }
 
 fn default_film() -> Film {
-    filmed("low-thw-overtake", ControllerChoice::MIS, (None, Level::Full))
+    filmed("low-thw-overtake", ControllerChoice::MIS, None, Level::Full)
 }
 
 /// Returns the films of an encounter in simulated traffic, used as recorded traffic, and of its
@@ -56,8 +56,8 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
     simulate(&scenario, key, &arm(ControllerChoice::ACC), &mut traffic).unwrap();
     let recording = smooth(&traffic.finish("own"));
     let changes = detect(&recording);
-    let encounter = encounter(&recording, &changes[0], &changes, (CONTROL_STEP, Lead::Required)).unwrap();
-    let again = reenact(&encounter, RearDriver::Model, (Path::new("own"), &[])).unwrap();
+    let encounter = encounter(&recording, &changes[0], &changes, CONTROL_STEP, Lead::Required).unwrap();
+    let again = reenact(&encounter, RearDriver::Model, Path::new("own"), &[]).unwrap();
     let again = again.concrete(&again.space().nominal()).unwrap();
     let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::MIS), level);
     let outcome = simulate(&again, key, &arm(ControllerChoice::MIS), &mut recorder).unwrap();
@@ -121,7 +121,7 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
     let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
         for (level, least) in [(Level::Events, 7), (Level::Objects, 9), (Level::Full, 9)] {
-            let films = [filmed(&name, ControllerChoice::MIS, (Some(SensorMode::Object), level))];
+            let films = [filmed(&name, ControllerChoice::MIS, Some(SensorMode::Object), level)];
             let (views, empty, timelines) = empty_views(&films);
             assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, no entity at {empty:?}");
             assert_eq!(timelines, [OPENING_TIMELINE], "{name}, {level:?}");
@@ -131,7 +131,7 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
 
 #[test]
 fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Objects);
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let (views, empty, _) = empty_views(&films);
     assert!(views >= 13 && empty.is_empty(), "{views} views, no entity at {empty:?}");
@@ -173,7 +173,7 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
 
 #[test]
 fn full_sensors_show_points_boxes_ground_truth_and_images() {
-    let films = [filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full))];
+    let films = [filmed("low-thw-overtake", ControllerChoice::MIS, Some(SensorMode::Full), Level::Full)];
     let data = chunks(&films, StoreKind::Recording);
     let entities = [
         "/mis/world/ego/lidar/clusters",
@@ -376,7 +376,7 @@ fn encoded(films: &[Film]) -> Vec<u8> {
 
 #[test]
 fn the_same_films_give_the_same_rows_and_other_films_another_name() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Objects);
     let pair = || [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     for kind in [StoreKind::Blueprint, StoreKind::Recording] {
         let [first, second] = [chunks(&pair(), kind), chunks(&pair(), kind)];
@@ -415,7 +415,7 @@ fn the_threads_of_recordings_end() {
 
 #[test]
 fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Events);
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let data = chunks(&films, StoreKind::Recording);
     let has = |entity: &str| data.iter().any(|chunk| chunk.entity_path().to_string() == entity);
@@ -430,7 +430,7 @@ fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
 
 #[test]
 fn each_collision_has_the_answer_of_an_explanation_by_whom_it_was_avoidable() {
-    let film = filmed("paper-figure", ControllerChoice::ACC, (None, Level::Events));
+    let film = filmed("paper-figure", ControllerChoice::ACC, None, Level::Events);
     let case = Case {
         file: library("paper-figure"),
         sampling: Sampling { seed: 1, design: Design::Random, samples: 1 },
@@ -454,13 +454,13 @@ fn each_collision_has_the_answer_of_an_explanation_by_whom_it_was_avoidable() {
         assert_eq!(of(index + 1), std::slice::from_ref(words));
     }
     assert!(of(words.len() + 1).is_empty());
-    let passes = filmed("paper-figure", ControllerChoice::MIS, (None, Level::Events));
+    let passes = filmed("paper-figure", ControllerChoice::MIS, None, Level::Events);
     assert!(passes.avoidable.is_empty() && passes.collisions().is_empty());
 }
 
 #[test]
 fn each_of_two_collisions_is_readable_in_the_row_of_states() {
-    let mut film = filmed("paper-figure", ControllerChoice::ACC, (None, Level::Events));
+    let mut film = filmed("paper-figure", ControllerChoice::ACC, None, Level::Events);
     let first = film.worst_collision().unwrap().clone();
     let lead =
         library("paper-figure").config().actors.iter().map(|actor| actor.id.clone()).find(|id| !first.involves(id));
@@ -489,7 +489,7 @@ fn each_of_two_collisions_is_readable_in_the_row_of_states() {
 
 #[test]
 fn both_halves_of_a_pair_open_at_the_same_moment() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Objects);
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let shown = films[0].worst_collision().unwrap().time;
     assert!(films[1].critical_moment() != shown, "the moments of the arms differ");
@@ -512,7 +512,7 @@ fn both_halves_of_a_pair_open_at_the_same_moment() {
 
 #[test]
 fn without_a_vehicle_behind_the_smallest_front_headway_is_the_critical_moment() {
-    let film = filmed("acc/acc-lead-slows", ControllerChoice::ACC, (None, Level::Events));
+    let film = filmed("acc/acc-lead-slows", ControllerChoice::ACC, None, Level::Events);
     assert!(film.worst_collision().is_none() && film.frames.iter().all(|frame| frame.margins.thw_rear_s.is_err()));
     let headways_s = film.frames.iter().filter_map(|frame| frame.margins.thw_front_s.ok());
     let smallest_s = headways_s.reduce(f64::min).unwrap();
@@ -523,7 +523,7 @@ fn without_a_vehicle_behind_the_smallest_front_headway_is_the_critical_moment() 
 
 #[test]
 fn a_half_that_ends_shortly_before_the_critical_moment_sets_the_moment_of_both() {
-    let film = filmed("overtake-without-brake", ControllerChoice::MIS, (None, Level::Objects));
+    let film = filmed("overtake-without-brake", ControllerChoice::MIS, None, Level::Objects);
     assert!(film.worst_collision().is_none());
     let critical = film.critical_frame_time();
     let ended = |before: Time| {
@@ -547,7 +547,7 @@ fn a_half_that_ends_shortly_before_the_critical_moment_sets_the_moment_of_both()
 
 #[test]
 fn a_fault_is_in_the_verdict_and_in_the_states_of_its_sensor() {
-    let film = |name| filmed(name, ControllerChoice::MIS, (None, Level::Events));
+    let film = |name| filmed(name, ControllerChoice::MIS, None, Level::Events);
     for (fault, words, row) in [
         ("faults/lidar-dead", "rear LiDAR dead", "2_rear_sensors"),
         ("faults/front-radar-ghost", "a vehicle that does not exist", "2_front_sensor"),
@@ -572,7 +572,7 @@ fn a_fault_is_in_the_verdict_and_in_the_states_of_its_sensor() {
 
 #[test]
 fn the_verdict_on_a_pair_is_its_first_word() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Events);
     let [baseline, tested] = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let first = |films: &[Film]| summary::verdict(films).lines().next().unwrap_or_default().to_owned();
     let sample = " · paper-figure · seed 1 · sample 0";
@@ -591,7 +591,7 @@ fn the_verdict_on_a_pair_is_its_first_word() {
 
 #[test]
 fn every_line_of_verdict_and_story_is_in_the_strong_colour() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Events);
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     for page in [summary::verdict(&films), summary::story(&films)] {
         for line in page.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
@@ -617,7 +617,7 @@ const LEAST_WIDTH: f32 = 2.0;
 
 #[test]
 fn no_curve_is_so_thin_that_its_colour_fades() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Events);
     let data = chunks(&[film(ControllerChoice::ACC), film(ControllerChoice::MIS)], StoreKind::Recording);
     let mut widths = 0;
     for chunk in &data {
@@ -640,7 +640,7 @@ fn names_from_above(data: &[Chunk]) -> Vec<String> {
 
 #[test]
 fn the_vehicles_next_to_the_ego_have_names_from_above_and_the_scene_shows_no_label() {
-    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Objects));
+    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, None, Level::Objects);
     let data = chunks(&[film], StoreKind::Recording);
     let labels = names_from_above(&data);
     for name in ["R rear ", "second "] {
@@ -661,7 +661,7 @@ fn the_vehicles_next_to_the_ego_have_names_from_above_and_the_scene_shows_no_lab
 
 #[test]
 fn the_verdict_names_the_vehicle_that_was_seen_and_the_vehicle_of_the_engagement() {
-    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, (None, Level::Events));
+    let film = filmed("rear-vehicles-one-after-another", ControllerChoice::MIS, None, Level::Events);
     let verdict = summary::verdict(&[film]);
     assert!(verdict.contains("the MIS engaged for R at "), "{verdict}");
     assert!(!verdict.contains("The vehicle behind was"), "{verdict}");
@@ -669,7 +669,7 @@ fn the_verdict_names_the_vehicle_that_was_seen_and_the_vehicle_of_the_engagement
 
 #[test]
 fn the_rows_of_states_of_a_pair_end_together() {
-    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let film = |controller| filmed("paper-figure", controller, None, Level::Events);
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     assert!(films[0].end() != films[1].end(), "the arms end at different times");
     let timeline = TimelineName::from_static_str(TIME_TIMELINE);
@@ -688,18 +688,18 @@ fn the_rows_of_states_of_a_pair_end_together() {
 
 #[test]
 fn a_track_that_belongs_to_no_vehicle_is_labelled_from_above() {
-    let film = filmed("faults/object-ghost", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+    let film = filmed("faults/object-ghost", ControllerChoice::MIS, Some(SensorMode::Object), Level::Objects);
     let data = chunks(std::slice::from_ref(&film), StoreKind::Recording);
     let labels = names_from_above(&data);
     assert!(labels.iter().any(|label| label == "does not exist"), "{} labels", labels.len());
     let verdict = summary::verdict(&[film]);
     assert!(verdict.contains("the MIS engaged for a vehicle that does not exist at 2."), "{verdict}");
     for ghost in ["faults/surround-ghost", "faults/front-radar-ghost"] {
-        let film = filmed(ghost, ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+        let film = filmed(ghost, ControllerChoice::MIS, Some(SensorMode::Object), Level::Objects);
         let labels = names_from_above(&chunks(&[film], StoreKind::Recording));
         assert!(labels.iter().any(|label| label == "does not exist"), "{ghost}: {} labels", labels.len());
     }
-    let truck = filmed("traffic/trucks-alongside", ControllerChoice::MIS, (Some(SensorMode::Object), Level::Objects));
+    let truck = filmed("traffic/trucks-alongside", ControllerChoice::MIS, Some(SensorMode::Object), Level::Objects);
     let beside = names_from_above(&chunks(&[truck], StoreKind::Recording));
     assert!(!beside.iter().any(|label| label == "does not exist"), "a truck beside the ego exists");
     let healthy = chunks(&[default_film()], StoreKind::Recording);
@@ -783,7 +783,7 @@ fn measured_points(chunks: &[Chunk], entity: &str) -> BTreeMap<i64, Vec<Measured
 
 #[test]
 fn recorded_beam_time_and_intensity_are_those_of_the_scan() {
-    let films = [filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full))];
+    let films = [filmed("low-thw-overtake", ControllerChoice::MIS, Some(SensorMode::Full), Level::Full)];
     let data = chunks(&films, StoreKind::Recording);
     let film = &films[0];
     for (layer, is_clustered) in [("clusters", true), ("rejected", false)] {
@@ -815,7 +815,7 @@ fn a_recording_that_is_sent_loops_the_seconds_around_its_critical_moment_before_
 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
-    let film = filmed("low-thw-overtake", ControllerChoice::MIS, (None, Level::Objects));
+    let film = filmed("low-thw-overtake", ControllerChoice::MIS, None, Level::Objects);
     write_recording_unchecked(&path, std::slice::from_ref(&film)).unwrap();
     let messages = LoopedRecording::read(&path).unwrap().with_loop().unwrap();
     let panels: Vec<(usize, Chunk)> = messages

@@ -33,7 +33,7 @@ fn instances() -> Vec<Instance> {
 
 /// Returns a film whose camera took an image in every fifth step, with the same instances in each.
 fn film_with_images() -> Film {
-    let mut film = filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full));
+    let mut film = filmed("low-thw-overtake", ControllerChoice::MIS, Some(SensorMode::Full), Level::Full);
     film.cameras[0].0.pipeline = Pipeline::MaskRcnn;
     for frame in film.frames.iter_mut().step_by(5) {
         let (time, shown_time) = (frame.time, frame.time);
@@ -53,7 +53,7 @@ fn pairs(chunk: &Chunk, component: &str) -> Vec<[f32; 2]> {
 
 #[test]
 fn the_pinhole_has_the_size_of_the_picture_that_is_shown_of_a_larger_image() {
-    let mut film = filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full));
+    let mut film = filmed("low-thw-overtake", ControllerChoice::MIS, Some(SensorMode::Full), Level::Full);
     let shown = |film: Film| {
         let all = chunks(&[film], StoreKind::Recording);
         let of_camera = |chunk: &&Chunk| chunk.entity_path().to_string() == "/mis/world/ego/camera";
