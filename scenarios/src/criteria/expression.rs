@@ -156,6 +156,17 @@ impl Quantity {
         }
     }
 
+    /// Returns the comparison that decides the flag in every sample that has the number; `None` if
+    /// there is none.
+    pub(super) fn comparison(self) -> Option<Comparison> {
+        if let Self::Compared(comparison) = self {
+            return Some(comparison);
+        }
+        let (flag, in_baseline) = self.measure()?;
+        let (number, threshold) = flag.exceeds()?;
+        Some(Comparison { measure: Measure::named(number)?, in_baseline, side: Side::Above, threshold })
+    }
+
     pub(super) fn is_flag(self) -> bool {
         match self {
             Self::Tested(measure) | Self::Baseline(measure) => measure.kind == MeasureKind::Flag,
@@ -247,15 +258,18 @@ impl Expression {
     }
 
     /// Returns true if `samples` samples cannot miss the gate, whatever happens in them: it allows a
-    /// count as large as their number, or a sum as large as theirs. Bounds that no number of samples
-    /// can miss are refused when the gate is read.
+    /// count as large as their number, or a sum as large or as small as theirs. Bounds that no number
+    /// of samples can miss are refused when the gate is read.
     pub fn holds_always(&self, samples: u64) -> bool {
-        let largest = match (self.aggregate, self.quantity.measure()) {
-            (Aggregate::Count, _) => 1.0,
-            (Aggregate::Sum, Some((measure, _))) => measure.range.high(),
+        let range = match (self.aggregate, self.quantity.measure()) {
+            (Aggregate::Count, _) => Range::UNIT,
+            (Aggregate::Sum, Some((measure, in_baseline))) => range_where(measure, in_baseline, self.condition),
             _ => return false,
         };
-        self.operator == Operator::AtMost && self.bound >= largest * samples as f64
+        match self.operator {
+            Operator::AtMost => self.bound >= range.high().max(0.0) * samples as f64,
+            Operator::AtLeast => self.bound <= range.low().min(0.0) * samples as f64,
+        }
     }
 
     /// Returns the range of the value that is bounded; `None` for a number without range.
@@ -271,7 +285,8 @@ impl Expression {
             Aggregate::Sum => {
                 let range = of_number()?;
                 let low = if range.low() < 0.0 { f64::NEG_INFINITY } else { range.low() };
-                Some(Range::closed(low, f64::INFINITY))
+                let high = if range.high() > 0.0 { f64::INFINITY } else { range.high() };
+                Some(Range::closed(low, high))
             }
         }
     }
@@ -280,9 +295,9 @@ impl Expression {
     /// something.
     fn foregone(&self) -> Option<String> {
         let Self { aggregate, quantity, condition, operator, bound } = *self;
-        for (flag, condition) in [Some((quantity, condition)), condition.map(|flag| (flag, None))].into_iter().flatten()
+        for (flag, condition) in [condition.map(|flag| (flag, None)), Some((quantity, condition))].into_iter().flatten()
         {
-            let Quantity::Compared(comparison) = flag else { continue };
+            let Some(comparison) = flag.comparison() else { continue };
             let range = range_where(comparison.measure, comparison.in_baseline, condition);
             if let Some(holds) = comparison.foregone(range) {
                 let when = if holds { "every sample" } else { "no sample" };
@@ -327,10 +342,8 @@ impl Expression {
 /// Returns the range of a number in the samples in which a condition holds.
 fn range_where(measure: &Measure, in_baseline: bool, condition: Option<Quantity>) -> Range {
     let (low, high) = (measure.range.low(), measure.range.high());
-    match condition {
-        Some(Quantity::Compared(Comparison { measure: of, in_baseline: arm, side, threshold }))
-            if of == measure && arm == in_baseline =>
-        {
+    match condition.and_then(Quantity::comparison) {
+        Some(Comparison { measure: of, in_baseline: arm, side, threshold }) if of == measure && arm == in_baseline => {
             match side {
                 Side::Above => Range::closed(low.max(threshold), high),
                 Side::Below => Range::closed(low, high.min(threshold)),
@@ -594,6 +607,19 @@ mod tests {
             ("share(harm > -1) <= 0.5", "holds in every sample"),
             ("count(ego_collided | min_gap_rear_m < 0) <= 0", "`min_gap_rear_m < 0` holds in no sample"),
             ("share(harm > 0.1 | harm > 0.5) >= 0.9", "holds in every sample"),
+            (
+                "share(harm > 0.1 | harm > 1e9) <= 0.5",
+                "`harm > 1000000000` holds in no sample: `harm` is a number from 0",
+            ),
+            ("mean(harm | harm > 1e9) <= 0.5", "`harm > 1000000000` holds in no sample"),
+            ("share(slowed_unprompted | unprompted_deficit_mps > 1) >= 0.9", "holds in every sample"),
+            ("share(slowed_unprompted | unprompted_deficit_mps > 0.5) >= 0.9", "holds in every sample"),
+            ("share(slowed_unprompted | unprompted_deficit_mps < 0.5) <= 0.1", "holds in no sample"),
+            ("share(unprompted_deficit_mps > 0.3 | slowed_unprompted) >= 0.9", "holds in every sample"),
+            ("min(crossing_braking_mps2 | braked_at_crossing) >= 1.5", always),
+            ("share(lead_braked | hazard) >= 0.9", "holds in every sample in which `hazard` holds"),
+            ("sum(thw_raised_s | thw_raised_s < 0) <= 0", "no sample can miss it: `thw_raised_s` is a number from"),
+            ("sum(thw_raised_s | thw_raised_s < 0) >= 1", never),
             ("share(rear_passed | rear_passed) >= 0.9", "holds in every sample in which `rear_passed` holds"),
             ("share(ego_collided | ego_collided) <= 0.5", "holds in every sample"),
             (
@@ -621,6 +647,10 @@ mod tests {
             "mean(thw_gain_s) >= 0",
             "min(thw_raised_s) >= 0",
             "share(rear_passed | baseline.rear_passed) >= 1",
+            "share(slowed_unprompted | unprompted_deficit_mps > 0.3) <= 0.5",
+            "share(slowed_unprompted) <= 0.1",
+            "sum(thw_raised_s | thw_raised_s < 0) >= -5",
+            "sum(thw_raised_s | thw_raised_s < 1) <= 0",
             "sum(harm) <= 0.1",
             "mean(harm) <= 0",
             "max(delta_v_mps) <= 0",
@@ -641,6 +671,11 @@ mod tests {
         assert!(!holds_always("share(ego_collided) <= 0.999"));
         assert!(holds_always("sum(max_jerk_mps3) <= 8000") && holds_always("sum(harm) <= 1e300"));
         assert!(!holds_always("sum(max_jerk_mps3) <= 7999") && !holds_always("sum(harm) <= 5"));
+        assert!(holds_always("sum(thw_gain_s) >= -1e300") && holds_always("sum(thw_gain_s) >= -2e8"));
+        assert!(!holds_always("sum(thw_gain_s) >= -1e8") && !holds_always("sum(thw_gain_s) >= 0"));
+        assert!(holds_always("sum(max_jerk_mps3 | max_jerk_mps3 < 30) <= 6000"));
+        assert!(!holds_always("sum(max_jerk_mps3 | max_jerk_mps3 < 30) <= 5999"));
+        assert!(!holds_always("sum(max_jerk_mps3 | max_jerk_mps3 > 30) >= 6000"), "few samples have the condition");
     }
 
     #[test]

@@ -8,12 +8,21 @@ use super::expression::Quantity;
 
 /// Flags of which the first holds only in samples in which the second one does. Both are flags of
 /// one arm, or the first is one of the pair.
-const IMPLIES: [(&str, &str); 5] = [
+const IMPLIES: [(&str, &str); 14] = [
     ("ego_strikes", "ego_collided"),
     ("ego_is_struck", "ego_collided"),
     ("others_collided_alone", "others_collided"),
     ("ego_touched", "touched"),
     ("prevented", "baseline.ego_collided"),
+    ("hazard", "lead_braked"),
+    ("hazard", "rear_near"),
+    ("goal_in_reach", "engaged"),
+    ("goal_due", "rear_near"),
+    ("goal_due", "rear_critical"),
+    ("goal_reached", "rear_near"),
+    ("goal_reached", "rear_critical"),
+    ("braked_at_crossing", "rear_crossed"),
+    ("rear_passed", "rear_crossed"),
 ];
 
 /// Flags of which no sample has both.
@@ -30,7 +39,7 @@ const BASELINE: &str = "baseline.";
 /// Returns the flags that hold wherever `flag` does, with itself.
 fn all_implied(flag: &str) -> Vec<String> {
     let mut all = vec![flag.to_owned()];
-    if let Some((_, implied)) = IMPLIES.iter().find(|(first, _)| *first == flag) {
+    for (_, implied) in IMPLIES.iter().filter(|(first, _)| *first == flag) {
         all.extend(all_implied(implied));
     }
     if let Some(of_baseline) = flag.strip_prefix(BASELINE) {
@@ -49,7 +58,9 @@ fn excludes(first: &str, second: &str) -> bool {
 /// it.
 pub(super) fn by(condition: Quantity, flag: Quantity) -> Option<bool> {
     let (given, asked) = (all_implied(&condition.to_string()), all_implied(&flag.to_string()));
-    if given.contains(&asked[0]) {
+    // A flag that is short for a comparison is the same as the comparison.
+    let is_same = condition.comparison().is_some_and(|of_condition| flag.comparison() == Some(of_condition));
+    if given.contains(&asked[0]) || is_same {
         return Some(true);
     }
     let is_excluded = given.iter().any(|given| asked.iter().any(|asked| excludes(given, asked)));
@@ -79,6 +90,25 @@ mod tests {
             ("baseline.ego_collided", "ego_collided", None),
             ("baseline.others_collided", "induced", None),
             ("rear_near", "engaged", None),
+            ("hazard", "lead_braked", Some(true)),
+            ("hazard", "rear_near", Some(true)),
+            ("baseline.hazard", "baseline.rear_near", Some(true)),
+            ("lead_braked", "hazard", None),
+            ("hazard", "baseline.rear_near", None),
+            ("goal_in_reach", "engaged", Some(true)),
+            ("goal_due", "rear_near", Some(true)),
+            ("goal_due", "rear_critical", Some(true)),
+            ("goal_due", "goal_reached", None),
+            ("goal_due", "braked_at_crossing", None),
+            ("goal_reached", "rear_critical", Some(true)),
+            ("braked_at_crossing", "rear_crossed", Some(true)),
+            ("rear_passed", "rear_crossed", Some(true)),
+            ("rear_crossed", "rear_passed", None),
+            ("unprompted_deficit_mps > 0.5", "slowed_unprompted", Some(true)),
+            ("slowed_unprompted", "unprompted_deficit_mps > 0.5", Some(true)),
+            ("crossing_braking_mps2 > 1.5", "braked_at_crossing", Some(true)),
+            ("baseline.unprompted_deficit_mps > 0.5", "slowed_unprompted", None),
+            ("unprompted_deficit_mps > 0.4", "slowed_unprompted", None),
         ] {
             let [condition, flag] = [condition, flag].map(|name| parse_quantity(name).unwrap());
             assert_eq!(by(condition, flag), expected, "{flag} | {condition}");

@@ -57,6 +57,16 @@ impl Measure {
         REPORTED.contains(&self.name)
     }
 
+    /// Returns the number and the threshold above which the flag holds, of a flag that one number
+    /// decides.
+    pub(super) fn exceeds(&self) -> Option<(&'static str, f64)> {
+        match self.name {
+            "slowed_unprompted" => Some(("unprompted_deficit_mps", SLOWED_MPS)),
+            "braked_at_crossing" => Some(("crossing_braking_mps2", HARD_BRAKING_MPS2)),
+            _ => None,
+        }
+    }
+
     /// Returns the measures that rest on what happened, and not on what a controller reports.
     pub fn measured() -> impl Iterator<Item = &'static Self> {
         MEASURES.iter().filter(|measure| !measure.is_reported())
