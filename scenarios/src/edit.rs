@@ -253,8 +253,13 @@ impl Setting {
             {
                 if self.key[depth + 1].parse::<usize>().is_ok() {
                     let list = self.key[..=depth].join(".");
-                    let allowed = format!("the file leaves this list out, and `{list}=[…]` gives it whole");
-                    return Err(self.no_such_element(&format!("list `{part}`"), allowed));
+                    let names = match keys(&**table) {
+                        names if names.is_empty() => "nothing".to_owned(),
+                        names => names,
+                    };
+                    let allowed =
+                        format!("the file has {names} there; if the list exists, `{list}=[…]` gives it whole");
+                    return Err(self.no_such_element(&format!("`{part}`"), allowed));
                 }
                 table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
             }
@@ -529,6 +534,8 @@ mod tests {
             ("tags.0.x=c", "there is no table `0`, only a value"),
             ("actor.0=3", "an element of this list is a table {…}"),
             ("sensors.lidars.0.name=x", "`sensors.lidars=[…]` gives it whole"),
+            ("actor.rear.events.0.id=x", "there is no `events`: the file has `id`, `event` there"),
+            ("actor.rear.events.0.id=x", "did you mean `event`?"),
             ("actor[0=3", "is not of the form key=value"),
             ("actor[]=3", "is not of the form key=value"),
             ("actor=[{id=me}]", "the value of `actor` is no TOML: "),
