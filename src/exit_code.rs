@@ -1,5 +1,6 @@
 //! Exit codes. An exit code is a verdict or the kind of a failure, never a count.
 
+use closecall_campaign::compare::Regression;
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::verdict::{Decision, Judgement};
@@ -78,6 +79,16 @@ impl From<Signal> for ExitCode {
         match signal {
             Signal::Interrupt => Self::Interrupted,
             Signal::Terminate => Self::Terminated,
+        }
+    }
+}
+
+impl From<Regression> for ExitCode {
+    fn from(regression: Regression) -> Self {
+        match regression {
+            Regression::None => Self::Pass,
+            Regression::NewErrors | Regression::NotCompared => Self::SampleError,
+            Regression::Worse => Self::Fail,
         }
     }
 }

@@ -22,6 +22,7 @@ use closecall_traffic::input::read_text;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::compare::Regression;
 use crate::folder::{Folder, FolderError};
 use crate::folder_error::json_fault;
 use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
@@ -67,6 +68,10 @@ pub struct ScenarioBaseline {
     pub errors: u64,
     /// The samples in which vehicles collide or that end in an error, in ascending order.
     pub failing: Vec<u64>,
+    /// The samples that end in an error. Only a campaign has them: the file does not tell them from
+    /// the other failing ones.
+    #[serde(skip)]
+    pub in_error: Vec<u64>,
     /// Quantiles of each margin, over the samples that have it (s or m).
     pub margins: BTreeMap<String, BTreeMap<String, f64>>,
 }
@@ -224,17 +229,24 @@ fn compare(
     after: &ScenarioBaseline,
     tolerance: f64,
 ) -> ScenarioBaselineComparison {
-    let only_in = |one: &[u64], other: &[u64]| one.iter().filter(|sample| !other.contains(sample)).copied().collect();
+    let only_in = |one: &[u64], other: &[u64]| -> Vec<u64> {
+        one.iter().filter(|sample| !other.contains(sample)).copied().collect()
+    };
+    let mut newly_failing = only_in(&after.failing, &before.failing);
+    newly_failing.retain(|sample| !after.in_error.contains(sample));
     let mut margins = Vec::new();
-    for (margin, quantiles) in &before.margins {
+    // The quantiles of other samples are not compared.
+    let has_all = before.errors == 0 && after.errors == 0;
+    for (margin, quantiles) in before.margins.iter().filter(|_| has_all) {
         if let Some(now) = after.margins.get(margin) {
             margins.extend(regressions(margin, quantiles, now, tolerance));
         }
     }
     ScenarioBaselineComparison {
         scenario: name.to_owned(),
-        newly_failing: only_in(&after.failing, &before.failing),
-        fixed: only_in(&before.failing, &after.failing),
+        newly_failing,
+        // A sample that ended in an error is not fixed, and the file does not name it.
+        fixed: if before.errors == 0 { only_in(&before.failing, &after.failing) } else { Vec::new() },
         margins,
     }
 }
@@ -273,6 +285,19 @@ impl SampleErrors {
 }
 
 impl BaselineComparison {
+    /// Returns whether the later campaign is worse.
+    pub fn regression(&self) -> Regression {
+        if self.not_compared.iter().any(|errors| errors.current > errors.baseline) {
+            Regression::NewErrors
+        } else if self.is_regression() {
+            Regression::Worse
+        } else if self.is_compared() {
+            Regression::None
+        } else {
+            Regression::NotCompared
+        }
+    }
+
     /// Returns true if a sample newly fails or a margin regresses.
     pub fn is_regression(&self) -> bool {
         self.scenarios.iter().any(|scenario| !scenario.newly_failing.is_empty() || !scenario.margins.is_empty())
@@ -295,11 +320,13 @@ impl BaselineComparison {
 pub struct ScenarioBaselineComparison {
     /// The scenario's name.
     pub scenario: String,
-    /// Samples that pass in the baseline and fail in the later campaign.
+    /// Samples that pass in the baseline and in which vehicles collide in the later campaign.
     pub newly_failing: Vec<u64>,
-    /// Samples that fail in the baseline and pass in the later campaign.
+    /// Samples that fail in the baseline and pass in the later campaign; none if some ended in an
+    /// error in the baseline.
     pub fixed: Vec<u64>,
-    /// The quantiles of margins that fell by more than the tolerance.
+    /// The quantiles of margins that fell by more than the tolerance; none if a sample ends in an
+    /// error, because the quantiles are then over other samples.
     pub margins: Vec<MarginRegression>,
 }
 
@@ -331,6 +358,7 @@ impl Collected {
             Err(_) => {
                 result.errors += 1;
                 result.failing.push(sample);
+                result.in_error.push(sample);
             }
         }
     }
@@ -397,9 +425,35 @@ mod tests {
             assert!(!comparison.is_regression() && !comparison.is_compared(), "{before} and {after} errors");
             let [errors] = &comparison.not_compared[..] else { panic!("{comparison:?}") };
             assert_eq!((errors.scenario.as_str(), errors.baseline, errors.current), ("headline", before, after));
+            let expected = if after > before { Regression::NewErrors } else { Regression::NotCompared };
+            assert_eq!(comparison.regression(), expected);
         }
         let empty = Baseline { scenarios: BTreeMap::new(), ..with_errors(0) };
         assert!(!empty.compare(&with_errors(0), 0.05).unwrap().is_compared(), "a baseline without a scenario");
+    }
+
+    #[test]
+    fn samples_in_error_are_neither_newly_failing_nor_fixed_and_their_margins_are_not_compared() {
+        let with_errors = |failing: &[u64], in_error: &[u64], gap_m: f64| {
+            let mut baseline = baseline(failing, gap_m);
+            let scenario = baseline.scenarios.get_mut("headline").unwrap();
+            (scenario.errors, scenario.in_error) = (in_error.len() as u64, in_error.to_vec());
+            baseline
+        };
+        let compare = |before: &Baseline, after: &Baseline| before.compare(after, 0.05).unwrap();
+        let (fine, worse) = (with_errors(&[2], &[], 4.0), with_errors(&[2, 5, 7], &[5, 7], 1.0));
+        let comparison = compare(&fine, &worse);
+        assert_eq!(comparison.regression(), Regression::NewErrors);
+        assert!(!comparison.is_regression(), "{comparison:?}");
+        let comparison = compare(&worse, &with_errors(&[2], &[], 0.5));
+        assert_eq!(comparison.regression(), Regression::NotCompared);
+        assert!(!comparison.is_regression() && !comparison.has_fixed(), "{comparison:?}");
+        // A collision beside the same errors is a regression, and new errors come first.
+        let collides = with_errors(&[2, 3, 5, 7], &[5, 7], 1.0);
+        let comparison = compare(&worse, &collides);
+        assert_eq!(comparison.scenarios[0].newly_failing, [3]);
+        assert_eq!(comparison.regression(), Regression::Worse);
+        assert_eq!(compare(&fine, &collides).regression(), Regression::NewErrors);
     }
 
     #[test]

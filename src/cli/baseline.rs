@@ -92,11 +92,7 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
 fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<ExitCode, CliError> {
     let (before, current) = (Baseline::read(file)?, Baseline::of(&Folder::open(dir))?);
     let comparison = before.compare(&current, tolerance)?;
-    let code = match comparison.is_regression() {
-        true => ExitCode::Fail,
-        false if comparison.is_compared() => ExitCode::Pass,
-        false => ExitCode::SampleError,
-    };
+    let code = ExitCode::from(comparison.regression());
     match format {
         Format::Json => {
             let object = json!({

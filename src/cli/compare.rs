@@ -50,11 +50,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let differences = baseline_manifest.differences(&current_manifest);
     let scenarios = compare_folders(&baseline, &current)?;
     let regression = Regression::of(&scenarios, args.max_newly_failing, args.tolerance);
-    let code = match regression {
-        Regression::None => ExitCode::Pass,
-        Regression::NewErrors | Regression::NotCompared => ExitCode::SampleError,
-        Regression::Worse => ExitCode::Fail,
-    };
+    let code = ExitCode::from(regression);
     match args.format {
         Format::Json => {
             outln!(

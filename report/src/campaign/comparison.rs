@@ -87,15 +87,7 @@ impl fmt::Display for BaselineText<'_> {
                 counted(*samples, "sample")
             )?;
         }
-        writeln!(
-            f,
-            "{}",
-            match self.0.is_regression() {
-                true => "REGRESSION",
-                false if self.0.is_compared() => "NO REGRESSION",
-                false => "NOT COMPARED",
-            }
-        )
+        writeln!(f, "{}", self.0.regression())
     }
 }
 
