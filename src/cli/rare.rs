@@ -281,15 +281,18 @@ impl Rare<'_> {
         spec.map(|spec| spec.gate)
     }
 
-    /// Returns the gates of the project files and of the scenario files that the event does not
-    /// judge, in words.
+    /// Returns the gates of the project files and of the scenario files, and the checks of these,
+    /// that the event does not judge, in words.
     fn not_judged(&self, event: EventExpression, works: &[Arc<Work>]) -> Option<String> {
         if self.gates.is_measurement {
             return None;
         }
-        let criteria = self.gates.specs.iter().map(|spec| format!("{} ({})", spec.expression, spec.source));
-        let mut unjudged: Vec<String> = criteria.collect();
+        let mut unjudged: Vec<String> = Vec::new();
         for work in works {
+            for spec in self.gates.of_scenario(&work.file) {
+                let text = format!("{} ({})", spec.expression, spec.source);
+                unjudged.extend((!unjudged.contains(&text)).then_some(text));
+            }
             let spec = self.gates.probability_of(&work.file);
             let spec = spec.filter(|spec| spec.source != GateSource::CommandLine);
             if let Some(spec) = spec.filter(|_| self.gate_of(event, work).is_none()) {

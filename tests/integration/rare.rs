@@ -150,6 +150,23 @@ fn the_gate_of_a_file_on_the_probability_is_judged_as_the_option_is() {
 }
 
 #[test]
+fn the_criteria_of_the_scenario_file_are_named_as_not_judged_and_each_once() {
+    let place = folder();
+    let text = fs::read_to_string(fixture()).unwrap();
+    let gated = text.replacen("[sensors]", "[gate]\nrequire = ['count(ego_strikes) <= 0']\n\n[sensors]", 1);
+    assert_ne!(gated, text);
+    let paths = ["known-rare-probability", "another"].map(|name| {
+        let path = place.path().join(format!("{name}.toml"));
+        fs::write(&path, gated.replacen("known-rare-probability", name, 1)).unwrap();
+        path.to_str().unwrap().to_owned()
+    });
+    let words = "--controller acc --design importance --event collision --max-probability 0.5 -n 3000";
+    let files = ["campaign", &paths[0], &paths[1]];
+    let said = stdout(&closecall(files.into_iter().chain(words.split_whitespace())), 0);
+    assert!(said.contains("  not judged by --design importance: count(ego_strikes) <= 0 (scenario file)\n"), "{said}");
+}
+
+#[test]
 fn a_budget_that_is_too_small_gives_no_number() {
     for method in ["importance", "subset"] {
         let output = rare(&format!("--design {method} --event collision -n 500"));
