@@ -13,6 +13,7 @@ use closecall_traffic::{
 use crate::coverage::CoveragePlan;
 use crate::criteria::{Expression, Quantity};
 use crate::grip::lateral_grip_mps2;
+use crate::outcome::LONGEST_RUN_S;
 
 use crate::run_key::RunKey;
 
@@ -69,10 +70,6 @@ impl Scenario {
         fleet.as_ref().map_or(*vehicle, |fleet| fleet.vehicle_in_run(*vehicle, id, key))
     }
 }
-
-/// Longest duration of a run that a scenario file may state (s): an assumption, against a misprint;
-/// 600 to 100,000 are plausible.
-pub(crate) const LONGEST_RUN_S: f64 = 3_600.0;
 
 impl Check for ScenarioConfig {
     type Checked = Scenario;

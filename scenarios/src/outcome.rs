@@ -6,6 +6,10 @@ pub use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, ActorId, Measured, Parameters, Time};
 use serde::{Deserialize, Serialize};
 
+/// Longest duration of a run that a scenario file may state (s): an assumption, against a misprint;
+/// 600 to 100,000 are plausible.
+pub(crate) const LONGEST_RUN_S: f64 = 3_600.0;
+
 /// The vehicle of two that closed the gap between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -3,9 +3,8 @@
 //! A measure has one value per sample and arm, or none. A *flag* is a measure that is 0 or 1. If
 //! `outcomes.parquet` has a column for the measure, both have the same name.
 
-use crate::checked::LONGEST_RUN_S;
 use crate::harm::harm;
-use crate::outcome::{Cost, EndReason, Margins, MisSummary, Moment, Outcome, Promise, worse};
+use crate::outcome::{Cost, EndReason, LONGEST_RUN_S, Margins, MisSummary, Moment, Outcome, Promise, worse};
 use crate::promise::{Goal, HARD_BRAKING_MPS2, is_due};
 use closecall_traffic::{Environment, GRAVITY_MPS2, LARGEST_JERK_MPS3, Measured, Range};
 
