@@ -13,6 +13,7 @@ use closecall_traffic::statistics::quantiles::median;
 use super::error::TrajectoryFileProblem;
 use super::estimated_lanes::{LEAST_RESULTANT, LEAST_VEHICLES, Period};
 use super::markings::{LaneMarkings, MarkedCarriageway};
+use super::plausible::MIN_SPEED_MPS;
 use super::source::{ReadError, Row};
 use crate::lane_change::LaneReliability;
 
@@ -223,19 +224,45 @@ pub(super) fn check_markings(rows: &[Row], markings: &LaneMarkings) -> Result<Op
     Ok(warning)
 }
 
-/// Returns the doubt about lanes in which a reader places vehicles by their positions: vehicles drive beside the
-/// road, or as a whole beside the middles of the lanes. They then cross markings while they keep their lanes, or
-/// change lanes that are not there.
-pub(super) fn doubt_of_placing(rows: &[Row], markings: &LaneMarkings) -> Option<String> {
+/// What becomes of lanes in which a reader places vehicles by their positions, if these are wrong.
+pub(super) const MISPLACED: &str =
+    "the positions or the lanes count from elsewhere, and lane changes are wrong or missing";
+
+/// Returns the doubt about lanes in which a reader places vehicles by their positions: many vehicles drive beside
+/// the road. Vehicles that stand there do not count.
+pub(super) fn doubt_of_edges(rows: &[Row], markings: &LaneMarkings) -> Option<String> {
     markings.carriageways().into_iter().find_map(|road| {
         let MarkedCarriageway { first, last, .. } = road;
         let mut vehicles = BTreeSet::new();
-        let (mut offsets, mut widths_m, mut beside) = (Vec::new(), Vec::new(), 0_usize);
+        let (mut beside, mut all) = (0_usize, 0_usize);
+        for row in rows.iter().filter(|row| road.holds(row.lane) && row.speed_mps > MIN_SPEED_MPS) {
+            let (left, right) = (markings.left_edge_m(Lane(row.lane)), markings.right_edge_m(Lane(row.lane)));
+            let Some((left_m, right_m)) = left.zip(right) else { continue };
+            beside += usize::from(row.d_m > left_m + MISPLACED_M || row.d_m < right_m - MISPLACED_M);
+            all += 1;
+            vehicles.insert(row.number);
+        }
+        let percent = 100.0 * beside as f64 / all.max(1) as f64;
+        (vehicles.len() >= LEAST_VEHICLES && percent > 100.0 * WARNED_SHARE).then(|| {
+            format!(
+                "in {percent:.0} % of the rows of lanes {first} to {last}, a vehicle drives more than {MISPLACED_M} m beside the lanes: \
+                 {MISPLACED}"
+            )
+        })
+    })
+}
+
+/// Returns the doubt about lanes in which a reader places vehicles by their positions: the vehicles as a whole drive
+/// beside the middles of the lanes. They then cross markings while they keep their lanes, or change lanes that are
+/// not there.
+pub(super) fn doubt_of_middles(rows: &[Row], markings: &LaneMarkings) -> Option<String> {
+    markings.carriageways().into_iter().find_map(|road| {
+        let MarkedCarriageway { first, last, .. } = road;
+        let mut vehicles = BTreeSet::new();
+        let (mut offsets, mut widths_m) = (Vec::new(), Vec::new());
         for row in rows.iter().filter(|row| road.holds(row.lane)) {
             let (left, right) = (markings.left_edge_m(Lane(row.lane)), markings.right_edge_m(Lane(row.lane)));
             let Some((left_m, right_m)) = left.zip(right) else { continue };
-            let is_beside = row.d_m > left_m + MISPLACED_M || row.d_m < right_m - MISPLACED_M;
-            beside += usize::from(is_beside);
             widths_m.push(left_m - right_m);
             offsets.push((row.d_m - 0.5 * (left_m + right_m)) / (left_m - right_m));
             vehicles.insert(row.number);
@@ -243,22 +270,13 @@ pub(super) fn doubt_of_placing(rows: &[Row], markings: &LaneMarkings) -> Option<
         if vehicles.len() < LEAST_VEHICLES {
             return None;
         }
-        let consequence = "the positions or the lanes count from elsewhere, and lane changes are wrong or missing";
-        let share = beside as f64 / offsets.len() as f64;
-        if share > WARNED_SHARE {
-            let percent = 100.0 * share;
-            return Some(format!(
-                "in {percent:.0} % of the rows of lanes {first} to {last}, a vehicle drives more than {MISPLACED_M} m beside the lanes: \
-                 {consequence}"
-            ));
-        }
         // Offsets have no end: half a lane to the left of one middle is half a lane to the right of another.
         let Period { resultant, phase_m: lanes, .. } = Period::of(&offsets, 1.0..=1.0);
         let shift_m = median(widths_m) * if lanes > 0.5 { lanes - 1.0 } else { lanes };
         let side = if shift_m > 0.0 { "left" } else { "right" };
         (resultant >= LEAST_RESULTANT && shift_m.abs() > SHIFTED_M).then(|| {
             format!(
-                "in lanes {first} to {last}, vehicles drive {:.1} m to the {side} of the middles of the lanes, on average: {consequence}",
+                "in lanes {first} to {last}, vehicles drive {:.1} m to the {side} of the middles of the lanes, on average: {MISPLACED}",
                 shift_m.abs()
             )
         })

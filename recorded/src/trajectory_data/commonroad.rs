@@ -23,7 +23,7 @@ use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
 use super::plain::allowed;
 use super::plane_pieces::PlaneMoment;
-use super::plane_steps::PlaneSteps;
+use super::plane_steps::{MappedRows, PlaneSteps};
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::xml::{Node, Xml};
@@ -55,6 +55,7 @@ pub(super) struct CommonRoadSource<R> {
     state: State,
     unknown_classes: UnknownClasses,
     steps: PlaneSteps,
+    mapped: MappedRows,
     is_over: bool,
 }
 
@@ -110,6 +111,7 @@ impl<R: BufRead> CommonRoadSource<R> {
             state: State::default(),
             unknown_classes: UnknownClasses::default(),
             steps: PlaneSteps::default(),
+            mapped: MappedRows::default(),
             is_over: false,
         })
     }
@@ -259,6 +261,7 @@ impl<R: BufRead> CommonRoadSource<R> {
         let (number, period) = (obstacle.id, self.step.unwrap_or_default());
         let (vehicle, time, point, speed_mps) = (number, period * frame, (x_m, y_m), velocity_mps);
         let moment = PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock: Clock::Continuous };
+        self.mapped.add(position.is_on_map, speed_mps);
         self.steps.add(moment);
         Ok(Some(Row {
             number,
@@ -340,6 +343,10 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
 
     fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
         self.steps.check(Layout::Commonroad).map_err(ReadError::of_file)
+    }
+
+    fn map_doubt(&self) -> Option<String> {
+        self.mapped.doubt()
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

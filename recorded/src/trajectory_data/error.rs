@@ -339,11 +339,11 @@ pub enum TrajectoryFileProblem {
     },
     /// The headings of vehicles contradict their movements.
     #[error(
-        "in {percent:.0} % of the steps, a vehicle moves in another direction than its heading states, by more than 30°: headings and \
+        "in {percent:.0} % of the movements, a vehicle moves in another direction than its heading states, by more than 30°: headings and \
          positions have different axes"
     )]
     HeadingsAgainstMotion {
-        /// Share of these steps (%).
+        /// Share of these movements (%).
         percent: f64,
     },
     /// No row belongs to the data set that is asked for.

@@ -54,6 +54,8 @@ pub(super) struct RoadPosition {
     pub(super) lane: u8,
     /// Heading of the road at the position, in the plane of the scenario (rad).
     pub(super) heading_rad: f64,
+    /// Whether a lanelet of the map is there.
+    pub(super) is_on_map: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -116,8 +118,7 @@ impl Roads {
         let rank = |road: &Road| {
             let on = road.line.project(point);
             let is_against = maths::cos(heading_rad - on.heading_rad) < 0.0;
-            let is_outside = !road.outlines.iter().any(|outline| contains(outline, point));
-            (is_against, is_outside, on.d_m.abs())
+            (is_against, !road.holds(point), on.d_m.abs())
         };
         let ranked = self.roads.iter().map(rank).enumerate();
         let best = ranked.min_by(|(_, a), (_, b)| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
@@ -130,11 +131,17 @@ impl Roads {
         let Projection { s_m, d_m, heading_rad } = road.line.project(point);
         let inside = road.lanes.iter().find(|(_, outline)| contains(outline, point)).map(|(lane, _)| *lane);
         let lane = inside.unwrap_or_else(|| road.nearest_lane(d_m)).saturating_add(road.first_lane);
-        Some(RoadPosition { s_m, d_m: d_m + road.shift_m, lane, heading_rad })
+        let is_on_map = inside.is_some() || self.roads.iter().any(|road| road.holds(point));
+        Some(RoadPosition { s_m, d_m: d_m + road.shift_m, lane, heading_rad, is_on_map })
     }
 }
 
 impl Road {
+    /// Returns `true` if one of its lanelets is at `point`.
+    fn holds(&self, point: Point) -> bool {
+        self.outlines.iter().any(|outline| contains(outline, point))
+    }
+
     /// Returns the lane whose middle is nearest to `d_m`.
     fn nearest_lane(&self, d_m: f64) -> u8 {
         let mut left_m = 0.0;

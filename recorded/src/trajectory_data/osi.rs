@@ -31,7 +31,7 @@ use super::lanelets::{Lanelet, Roads};
 use super::osi_messages::{Messages, refused};
 use super::plain::allowed;
 use super::plane_pieces::PlaneMoment;
-use super::plane_steps::PlaneSteps;
+use super::plane_steps::{MappedRows, PlaneSteps};
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use crate::lane_change::LaneReliability;
@@ -99,6 +99,7 @@ pub(super) fn read<'a, R: BufRead + 'a>(
             road_of: BTreeMap::new(),
             rows: VecDeque::new(),
             steps: PlaneSteps::default(),
+            mapped: MappedRows::default(),
         }));
     }
     if lanes == LaneReliability::Reliable {
@@ -280,6 +281,7 @@ struct OsiSource<R> {
     road_of: BTreeMap<u64, usize>,
     rows: VecDeque<Row>,
     steps: PlaneSteps,
+    mapped: MappedRows,
 }
 
 impl<R: BufRead> RowSource for OsiSource<R> {
@@ -297,6 +299,10 @@ impl<R: BufRead> RowSource for OsiSource<R> {
 
     fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
         self.steps.check(Layout::Osi).map_err(ReadError::of_file)
+    }
+
+    fn map_doubt(&self) -> Option<String> {
+        self.mapped.doubt()
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
@@ -318,6 +324,7 @@ impl<R: BufRead> RowSource for OsiSource<R> {
                 let Some(place) = self.roads.locate(road, point) else { continue };
                 let (time, clock) = (vehicle.time, Clock::Continuous);
                 let speed_mps = Observed::along(vehicle.velocity_mps, heading_rad);
+                self.mapped.add(place.is_on_map, speed_mps);
                 self.steps.add(PlaneMoment { vehicle: number, time, point, heading_rad, speed_mps, clock });
                 let along = |vector| Observed::along(vector, place.heading_rad);
                 self.rows.push_back(Row {

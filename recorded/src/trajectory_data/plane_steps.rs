@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use closecall_traffic::maths;
 use closecall_traffic::statistics::quantiles::median;
 
+use super::axes::MISPLACED;
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
 use super::plane_pieces::PlaneMoment;
@@ -22,8 +23,8 @@ use super::plausible::{MIN_SPEED_MPS, MIN_STEPS, check_ratio};
 
 /// Number of steps that are judged.
 const ENOUGH: usize = 200_000;
-/// Least movement that shows a direction (m).
-const LEAST_STEP_M: f64 = 0.3;
+/// Least movement that shows a direction (m). The positions of a standing vehicle vary by less than a metre.
+const LEAST_MOVEMENT_M: f64 = 2.0;
 /// Least number of such movements.
 const LEAST_STEPS: usize = 50;
 /// Cosine of the largest angle between a heading and the movement, 30° (-).
@@ -32,11 +33,42 @@ const MOST_TURNED: f64 = 0.866;
 /// same for both carriageways contradict half of them; numbers that jump from vehicle to vehicle contradict
 /// single ones. An assumption with a plausible range of 0.05 to 0.4.
 const CONTRADICTED: f64 = 0.2;
+/// Share of the rows of moving vehicles off the lanes of the map above which the file is in doubt (-). If the map
+/// is shifted by a lane, a fifth to a half of the traffic is off it; on shoulders drive single vehicles. An assumption
+/// with a plausible range of 0.05 to 0.2.
+const OFF_MAP: f64 = 0.1;
+
+/// The rows of moving vehicles that a map has lanes for.
+#[derive(Debug, Default)]
+pub(super) struct MappedRows {
+    off_map: usize,
+    all: usize,
+}
+
+impl MappedRows {
+    /// Adds a row: whether a lane of the map is there, and the speed (m/s).
+    pub(super) fn add(&mut self, is_on_map: bool, speed_mps: f64) {
+        if speed_mps.abs() > MIN_SPEED_MPS {
+            self.off_map += usize::from(!is_on_map);
+            self.all += 1;
+        }
+    }
+
+    /// Returns the doubt about the lanes if many vehicles drive beside all of them.
+    pub(super) fn doubt(&self) -> Option<String> {
+        let share = self.off_map as f64 / self.all.max(1) as f64;
+        (self.all >= LEAST_STEPS && share > OFF_MAP).then(|| {
+            format!("in {:.0} % of the rows, a vehicle drives beside the lanes of the map: {MISPLACED}", 100.0 * share)
+        })
+    }
+}
 
 /// The steps of vehicles between two rows.
 #[derive(Debug, Default)]
 pub(super) struct PlaneSteps {
     latest: BTreeMap<u64, PlaneMoment>,
+    /// Where each vehicle began its present movement.
+    anchors: BTreeMap<u64, PlaneMoment>,
     movements: usize,
     against: usize,
     /// Distance of each step as a share of the distance that the speed predicts (-).
@@ -60,7 +92,10 @@ impl PlaneSteps {
         if speed_mps > MIN_SPEED_MPS && step_s > 0.0 && self.ratios.len() < ENOUGH {
             self.ratios.push(moved_m / (speed_mps * step_s));
         }
-        if moved_m >= LEAST_STEP_M {
+        let anchor = self.anchors.entry(row.vehicle).or_insert(before);
+        let (dx, dy) = (row.point.0 - anchor.point.0, row.point.1 - anchor.point.1);
+        if maths::hypot(dx, dy) >= LEAST_MOVEMENT_M {
+            *anchor = row;
             self.movements += 1;
             self.against += usize::from(maths::cos(maths::atan2(dy, dx) - row.heading_rad) < MOST_TURNED);
         }
@@ -79,5 +114,56 @@ impl PlaneSteps {
             return Err(TrajectoryFileProblem::HeadingsAgainstMotion { percent: 100.0 * share });
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::Time;
+
+    use super::super::source::Clock;
+    use super::*;
+
+    /// The rows of a vehicle, in steps of 0.1 s, with these distances along x (m).
+    fn along_x(heading_rad: f64, speed_mps: f64, x_m: impl Fn(i32) -> f64) -> PlaneSteps {
+        let mut steps = PlaneSteps::default();
+        for step in 0..1000 {
+            let time = Time::from_s(0.1 * f64::from(step));
+            let point = (x_m(step), 0.0);
+            steps.add(PlaneMoment { vehicle: 1, time, point, heading_rad, speed_mps, clock: Clock::Continuous });
+        }
+        steps
+    }
+
+    #[test]
+    fn a_standing_vehicle_moves_in_no_direction() {
+        let standing = along_x(0.0, 0.0, |step| if step % 2 == 0 { 0.6 } else { 0.0 });
+        assert_eq!(standing.movements, 0);
+        // Slow, and back by 0.4 m in every other step.
+        let jam = along_x(0.0, 1.0, |step| 0.1 * f64::from(step) + if step % 2 == 0 { 0.5 } else { 0.0 });
+        assert!(jam.movements >= LEAST_STEPS - 10 && jam.against == 0, "{jam:?}");
+    }
+
+    #[test]
+    fn headings_across_or_against_the_movement_are_refused() {
+        let drive = |heading_rad| along_x(heading_rad, 20.0, |step| 2.0 * f64::from(step)).check(Layout::Osi);
+        drive(0.4).unwrap();
+        for heading_rad in [0.6, -0.6, 3.0] {
+            let problem = drive(heading_rad).unwrap_err();
+            assert!(matches!(problem, TrajectoryFileProblem::HeadingsAgainstMotion { .. }), "{problem}");
+        }
+    }
+
+    #[test]
+    fn a_map_is_in_doubt_if_much_of_the_moving_traffic_is_off_it() {
+        let doubt = |off_map: usize, speed_mps: f64| {
+            let mut rows = MappedRows::default();
+            (0..100).for_each(|row| rows.add(row >= off_map, speed_mps));
+            rows.doubt()
+        };
+        assert!(doubt(25, 20.0).unwrap().contains("in 25 % of the rows"));
+        assert!(doubt(25, -20.0).is_some());
+        assert_eq!(doubt(7, 20.0), None, "single vehicles on the shoulder");
+        assert_eq!(doubt(25, 0.0), None, "vehicles that stand");
     }
 }

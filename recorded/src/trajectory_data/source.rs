@@ -104,6 +104,11 @@ pub(super) trait RowSource {
         Ok(())
     }
 
+    /// Returns the doubt about lanes of a map, if many vehicles so far drive beside all of them.
+    fn map_doubt(&self) -> Option<String> {
+        None
+    }
+
     /// Returns `true` if the file states, apart from its positions, which lane is to the left.
     fn names_sides(&self) -> bool {
         true

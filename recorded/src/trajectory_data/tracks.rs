@@ -591,7 +591,8 @@ impl<'a> Tracks<'a> {
         if layout == Layout::Plain && self.lanes == LaneReliability::Reliable {
             lane_spacing::check(beginning)?;
         }
-        if let (Layout::Highd | Layout::I24 | Layout::Commonroad | Layout::Osi, Some(markings)) = (layout, stated)
+        // The maps of the other layouts can have roads that end, exits and shoulders, where vehicles drive, too.
+        if let (Layout::Highd | Layout::I24, Some(markings)) = (layout, stated)
             && (layout == Layout::Highd || self.lanes == LaneReliability::Reliable)
         {
             axes::check_carriageways(beginning, markings)?;
@@ -602,7 +603,11 @@ impl<'a> Tracks<'a> {
         if let (Layout::I24 | Layout::Commonroad | Layout::Osi, LaneReliability::Reliable, Some(markings)) =
             (layout, self.lanes, stated)
         {
-            self.lane_doubt = axes::doubt_of_placing(beginning, markings);
+            let beside = match layout {
+                Layout::I24 => axes::doubt_of_edges(beginning, markings),
+                _ => self.source.map_doubt(),
+            };
+            self.lane_doubt = beside.or_else(|| axes::doubt_of_middles(beginning, markings));
         }
         Ok(())
     }

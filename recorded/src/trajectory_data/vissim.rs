@@ -367,7 +367,8 @@ impl Reader {
                 by_link.len()
             ));
         }
-        let grows_to_the_right = self.steps[1] < self.steps[0];
+        // Positions that are as steady both ways, such as those of changes within one step, show no sense.
+        let grows_to_the_right = 2.0 * self.steps[1] < self.steps[0];
         for row in self.collected.rows_mut() {
             if let Position::Road { road, d_m, lane, .. } = &mut row.position
                 && let Some(&LinkRoad { first_lane, shift_m, lanes }) = by_link.get(road)
