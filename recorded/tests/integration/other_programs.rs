@@ -380,7 +380,7 @@ fn headings_in_other_axes_than_the_positions_are_refused_by_that_reason() {
     let text = unnamed_road(true, false).replace("angle=\"270\"", "angle=\"90\"");
     assert_mentions(
         &read_text(text.as_bytes()).unwrap_err(),
-        &["in 47 % of the steps", "different axes"],
+        &["in 47 % of the movements", "different axes"],
         "one heading",
     );
 }
@@ -411,7 +411,7 @@ fn headings_of_exid_in_other_axes_are_refused_by_that_reason() {
     std::fs::write(&path, text.replace(",0.0,1.9,4.7,", ",90.0,1.9,4.7,")).unwrap();
     assert_mentions(
         &read(folder.path()).unwrap_err(),
-        &["05_tracks.csv", "100 % of the steps", "different axes"],
+        &["05_tracks.csv", "100 % of the movements", "different axes"],
         "north",
     );
 }
