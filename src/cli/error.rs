@@ -125,7 +125,7 @@ pub enum CliError {
         /// The trajectory file.
         file: String,
         /// How far the closest driver is from the recording.
-        source: StepZeroError,
+        source: Box<StepZeroError>,
     },
     /// A parameter that a sample varies cannot have one of its values.
     #[error("{} {parameter} cannot be {value}: {reason}", Argument("vary"))]

@@ -91,7 +91,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         let zero = zero.map_err(|error| match error {
             StepZeroError::Step(error) => of_step(error, 0),
             not_reproduced @ StepZeroError::NotReproduced(_) => {
-                CliError::NotReproduced { file: args.file.display().to_string(), source: not_reproduced }
+                CliError::NotReproduced { file: args.file.display().to_string(), source: Box::new(not_reproduced) }
             }
         })?;
         Ok((source, zero))
