@@ -258,8 +258,8 @@ pub struct BaselineComparison {
     pub scenarios: Vec<ScenarioBaselineComparison>,
     /// The scenarios that the baseline does not have.
     pub new_scenarios: Vec<String>,
-    /// The scenarios of which some samples are not compared, because they end in an error in the
-    /// baseline or in the later campaign.
+    /// Scenarios with samples that end in an error, in the baseline or in the later campaign. These
+    /// samples are not compared.
     pub not_compared: Vec<SampleErrors>,
 }
 

@@ -177,8 +177,8 @@ pub trait Perception: Send {
         Vec::new()
     }
 
-    /// Returns the names of those of several rear cameras that delivered no image for the latest
-    /// scan, or were known to have failed: others classified what they see.
+    /// Returns the names of the rear cameras that delivered no image for the latest scan, or were
+    /// known to have failed, if there are several. The other cameras classified what they see.
     fn failed_cameras(&self) -> &[&'static str] {
         &[]
     }

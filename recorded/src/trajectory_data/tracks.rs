@@ -555,7 +555,7 @@ impl<'a> Tracks<'a> {
         Ok(())
     }
 
-    /// Checks the rows at the beginning of the file, of which it states these markings, and keeps what a reader of
+    /// Checks the rows at the beginning of the file against the markings that it states. Keeps what a reader of
     /// results has to know.
     fn check_beginning(
         &mut self,

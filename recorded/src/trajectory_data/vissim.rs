@@ -367,7 +367,7 @@ impl Reader {
                 by_link.len()
             ));
         }
-        // Positions that are as steady both ways, such as those of changes within one step, show no sense.
+        // Changes within one step are as steady in one sense as in the other: they do not show which one holds.
         let grows_to_the_right = 2.0 * self.steps[1] < self.steps[0];
         for row in self.collected.rows_mut() {
             if let Position::Road { road, d_m, lane, .. } = &mut row.position

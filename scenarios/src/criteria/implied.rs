@@ -6,8 +6,8 @@
 
 use super::expression::Quantity;
 
-/// Flags of which the first holds only in samples in which the second one does. Both are flags of
-/// one arm, or the first is one of the pair.
+/// Pairs of flags: if the first holds in a sample, the second one holds, too. Both are flags of one
+/// arm, or the first is a flag of the pair.
 const IMPLIES: [(&str, &str); 14] = [
     ("ego_strikes", "ego_collided"),
     ("ego_is_struck", "ego_collided"),
@@ -25,7 +25,7 @@ const IMPLIES: [(&str, &str); 14] = [
     ("rear_passed", "rear_crossed"),
 ];
 
-/// Flags of which no sample has both.
+/// Pairs of flags that never hold in the same sample.
 const EXCLUDES: [(&str, &str); 5] = [
     ("ego_collided", "others_collided_alone"),
     ("prevented", "induced"),

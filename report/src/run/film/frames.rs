@@ -116,7 +116,7 @@ pub struct Frame {
     /// Images of rear cameras that a network has evaluated as a whole, in the frames in which they
     /// were taken; none below [`Level::Full`].
     pub(in crate::run) rear_images: Vec<RearImage>,
-    /// Names of those of several rear cameras that had failed when the scan was classified.
+    /// Names of the rear cameras that had failed when the scan was classified, if there are several.
     pub(in crate::run) failed_cameras: Vec<&'static str>,
 }
 
