@@ -132,7 +132,7 @@ mod tests {
 
     use super::*;
 
-    /// Traffic in three lanes, of which every sixth vehicle changes to the lane beside it.
+    /// Traffic in three lanes. Every sixth vehicle changes to the lane beside it.
     fn traffic() -> String {
         let mut text =
             "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();

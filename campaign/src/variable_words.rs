@@ -4,7 +4,7 @@
 //! Both functions return a text that is compared with others and never shown.
 
 /// The folders of temporary files (Filesystem Hierarchy Standard 3.0, sections 3.18 and 5.15; the
-/// last one is that of macOS), each with the number of folders below it whose names are random.
+/// last one is a folder of macOS), each with the number of folders below it whose names are random.
 const TEMPORARY: [(&str, usize); 4] = [("/tmp/", 1), ("/var/tmp/", 1), ("/dev/shm/", 1), ("/var/folders/", 4)];
 /// The folder in which macOS keeps some of them.
 const PRIVATE: &str = "/private";

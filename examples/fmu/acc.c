@@ -3,7 +3,7 @@
  *   python3 examples/fmu/build.py 2 acc.fmu
  *   closecall run low-thw-overtake --controller fmu:./acc.fmu
  *
- * The types are those of the headers that the FMI standard publishes. The controller itself is examples/acc_controller.c. */
+ * The headers that the FMI standard publishes have the same types. The controller itself is examples/acc_controller.c. */
 #include <stdbool.h>
 #include <stddef.h>
 

@@ -3,8 +3,8 @@
 >>> import closecall.ray
 >>> result = closecall.ray.campaign("low-thw-overtake", n=20_000, paired=True, out="results", address="auto")
 
-The campaign itself stays in this process: its folder, its journal, its gates and its verdict are those of
-:func:`closecall.campaign`, byte for byte. Blocks of samples run as tasks of Ray, which runs a task again if its worker or its
+The campaign itself stays in this process: its folder, its journal, its gates and its verdict are the same
+as with :func:`closecall.campaign`, byte for byte. Blocks of samples run as tasks of Ray, which runs a task again if its worker or its
 machine fails, and adds machines as far as it may.
 
 Every machine needs the same wheel of Closecall. Scenarios, recorded traffic, controllers in Python and files that the command of a

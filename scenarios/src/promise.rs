@@ -25,7 +25,7 @@ pub const GOAL_GAIN_S: f64 = 2.0;
 pub(crate) const SHORTFALL_S: f64 = 0.1;
 const _: () = assert!(GOAL_TOLERANCE_S < SHORTFALL_S);
 
-/// Braking of the ego around the crossing above which it counts as hard (m/s²): an assumption,
+/// Braking of the ego around the crossing above which it is hard (m/s²): an assumption,
 /// above the comfort limit of 1 m/s² with its overshoot; 1.2 to 3 are plausible.
 pub const HARD_BRAKING_MPS2: f64 = 1.5;
 

@@ -1,4 +1,4 @@
-//! Names of sensors of which a scenario can have several.
+//! Names of sensors that a scenario can have more than once.
 
 use closecall_traffic::{ActorId, ConfigError, Problem};
 

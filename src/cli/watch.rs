@@ -97,8 +97,8 @@ impl WatchArgs {
         ]
     }
 
-    /// Prints which files were written: the recording and the tables. The names of OSI trace files are
-    /// those of the standard: they are printed when they are written.
+    /// Prints which files were written: the recording and the tables. The names of OSI trace files
+    /// follow the standard: they are printed when they are written.
     pub(super) fn print_files(&self) {
         let named = self.outputs().into_iter().filter(|(option, _)| *option != "--osi");
         named.filter_map(|(_, path)| path).for_each(print_written);

@@ -28,7 +28,7 @@ fn the_study_counts_both_outcomes_and_compares_them_with_what_was_published() {
             let count = |key: &str| row[outcome][key].as_u64().unwrap();
             assert!(count("both") <= count("without").min(count("with")), "{row}");
         }
-        // Who brakes at least as early and as hard strikes no more often.
+        // Earlier or harder braking strikes no more often.
         assert!(row["striking"]["with"].as_u64() <= row["striking"]["without"].as_u64(), "{row}");
     }
     for (outcome, published) in [("striking", 0.5), ("struck", 1.2)] {

@@ -120,7 +120,7 @@ fn a_wrong_table_of_crates_is_found() {
 }
 
 /// The libraries. The command line, `src`, maps their messages to its options.
-const LIBRARIES: [&str; 9] =
+pub(crate) const LIBRARIES: [&str; 9] =
     ["traffic", "recorded", "scenarios", "sensors", "controllers", "simulation", "campaign", "studies", "report"];
 
 /// Returns the source files below a folder, without the files of tests.

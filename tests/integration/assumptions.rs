@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::support::ROOT;
 
 /// Returns the Rust files below a folder.
-fn sources(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -42,8 +42,8 @@ fn outcomes_do_not_depend_on_vector_instructions() {
     assert!(!refused.status.success() && stderr(&refused).contains(INSTRUCTION_SETS[0]), "{}", stderr(&refused));
 }
 
-/// Functions of the C library whose last digits depend on its version and on the processor. Those
-/// of single precision have an `f` behind.
+/// Functions of the C library whose last digits depend on its version and on the processor. With
+/// an `f` behind, they are of single precision.
 const INEXACT: [&str; 35] = [
     "sin", "cos", "sincos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
     "exp", "exp2", "exp10", "expm1", "log", "log2", "log10", "log1p", "pow", "cbrt", "hypot", "erf", "erfc", "lgamma",

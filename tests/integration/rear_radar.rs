@@ -86,7 +86,7 @@ fn rear_radars_make_the_speed_of_a_new_track_surer() {
 fn a_campaign_runs_with_rear_radars_and_their_faults() {
     let folder = folder();
     let scenario = folder.path().join("radars.toml");
-    let text = "base = \"low-thw-overtake\"\nname = \"radars\"\ndescription = \"Rear radars, of which one dies.\"\n\
+    let text = "base = \"low-thw-overtake\"\nname = \"radars\"\ndescription = \"Rear radars. One of them dies.\"\n\
                 sensors.mode = \"full\"\nsensors.rear-camera.pipeline = \"off\"\nsensors.rear-radar = {}\n\
                 [[fault.rear-radar]]\nside = \"left\"\ndead = true\nfrom-s = 2.0\n";
     std::fs::write(&scenario, text).unwrap();

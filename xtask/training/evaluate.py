@@ -29,7 +29,7 @@ Says what a LiDAR cluster behind the ego vehicle looks like in the rear camera: 
 - **Output** `scores`, float32 [1, 4]: calibrated probabilities of car, truck, motorcycle, background.
 - **Network**: four convolutions (16, 32, 48, 64 channels) and one linear layer; {weights} bytes, SHA-256 `{digest}`.
 - **Trained on** crops that Closecall's own renderer draws (`xtask/training/README.md` has the commands), with boxes off by as
-  much as those of LiDAR clusters. It has seen no photograph, and what it says of photographs is not known.
+  much as the boxes of LiDAR clusters. It has seen no photograph, and what it says of photographs is not known.
 - **Calibration**: one temperature, fitted on a tenth of the training scenes.
 - **Judged on** {count} held-out crops: body shapes, bands of paint and seeds that training never saw, in the
   `onnxruntime` wheel, one crop at a time. A vehicle that is hidden by more than 45 % is not counted.

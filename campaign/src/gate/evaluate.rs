@@ -161,7 +161,7 @@ pub struct Evaluation {
     pub certainty: Option<Certainty>,
     /// Samples that have the quantity and satisfy the condition.
     pub samples: u64,
-    /// Those of them that have the flag.
+    /// Samples among them that have the flag.
     pub hits: u64,
     /// Whether the bound is satisfied.
     pub answer: Answer,

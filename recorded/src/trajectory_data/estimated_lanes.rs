@@ -10,8 +10,8 @@
 //!
 //! 1. The lane width is the period of the density between 3.0 and 4.0 m: the width w with the largest
 //!    resultant R = |Σ exp(2πi·d/w)| / n (the Rayleigh statistic of circular data; K. V. Mardia, P. E.
-//!    Jupp, *Directional Statistics*, 2000, section 6.3). Lanes of motorways are 3.25 to 3.75 m wide
-//!    (RAA 2008), those of US interstates 3.66 m, and NGSIM's 3.4 m.
+//!    Jupp, *Directional Statistics*, 2000, section 6.3). Lanes are 3.25 to 3.75 m wide on German
+//!    motorways (RAA 2008), 3.66 m on US interstates, and 3.4 m in NGSIM.
 //! 2. Within each period, the mode of the density is where vehicles drive. An empty lane between two others has
 //!    its mode between theirs.
 //! 3. A marking lies halfway between two modes. Drivers keep off the middle of their lanes by a

@@ -48,8 +48,8 @@ pub(super) mod allowed {
     pub(in super::super) const LANES: (i64, i64) = (0, 255);
     /// Times from the start of a file, or Unix times until the year 2100.
     pub(in super::super) const TIME_S: Bounds = Bounds::closed(0.0, 4_102_444_800.0);
-    /// Positions along a road. They may count from the beginning of a motorway, or be those of a map
-    /// in metres, as in UTM.
+    /// Positions along a road. They may count from the beginning of a motorway, or be positions on a
+    /// map in metres, as in UTM.
     pub(in super::super) const POSITION_M: Bounds = Bounds::closed(-1e7, 1e7);
     pub(in super::super) const LATERAL_M: Bounds = Bounds::closed(-1e3, 1e3);
     pub(in super::super) const SPEED_MPS: Bounds = Bounds::closed(0.0, 150.0);

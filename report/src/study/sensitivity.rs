@@ -64,7 +64,7 @@ fn by_main_effect(study: &Sensitivity, output: &OutputIndices, greatest: usize) 
             "; its interval reaches 0, so that chance may explain it".to_owned()
         }
         (Some(greatest_effect), Some((other, next))) if greatest_effect.interval_95[0] <= next.interval_95[1] => {
-            format!("; its interval overlaps that of {}", study.factors[other].name)
+            format!("; its interval overlaps the interval of {}", study.factors[other].name)
         }
         _ => String::new(),
     };

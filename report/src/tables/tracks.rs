@@ -2,7 +2,7 @@
 //! that each is matched with.
 //!
 //! The rows hold all that a test of the tracker's consistency needs: state, covariance, and the
-//! errors of the nearest face. The matching is that of
+//! errors of the nearest face. They are matched as by
 //! [`TrackAudit`](closecall_sensors::TrackAudit).
 
 use std::io;

@@ -62,7 +62,7 @@ impl ComputingTime {
         }
     }
 
-    /// Adds the time of a step. That of the first does not count: a program starts in it. Returns a
+    /// Adds the time of a step. The time of the first does not count: a program starts in it. Returns a
     /// message if the mean, or the time of too many steps, exceeds `allowed_ms`.
     pub(crate) fn exceeded(&mut self, spent: Duration, allowed_ms: f64) -> Option<String> {
         if !std::mem::replace(&mut self.has_begun, true) {

@@ -3,7 +3,7 @@
 //! ```text
 //!  scenario ─▶ full chain ─┬▶ distances from which on a confirmed track lasts, and is classified as a vehicle,
 //!                          │  over class, paint, plate, shape, extinction ─▶ ranges
-//!                          ├▶ errors and losses of the tracks over class, paint, extinction ─▶ those of the measurements
+//!                          ├▶ errors and losses of the tracks over class, paint, extinction ─▶ of the measurements
 //!                          └▶ scores of the true class ─▶ confidence
 //! ```
 //!

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// values are exact to one part in 16,384.
 const ROUNDED_BITS: u32 = 39;
 
-/// A histogram with equal bins within each power of two, like that of G. Tene's *HdrHistogram*:
+/// A histogram with equal bins within each power of two, as in G. Tene's *HdrHistogram*:
 /// each value counts as the nearest of the 8,192 values in its octave. Memory depends on the range
 /// of the values, not on their number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

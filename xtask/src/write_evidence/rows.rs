@@ -53,8 +53,8 @@ pub(super) const TWINS: [&str; 10] = [
 ];
 
 /// Scenarios in which the lead vehicle brakes, with the parameter of its speed and the arms that
-/// run them. Without the braking they have no twin in the library: their drivers differ from those
-/// of [`TWINS`].
+/// run them. Without the braking they have no twin in the library: the drivers of [`TWINS`]
+/// differ from theirs.
 const BRAKING: [(&str, &str, [&str; 2]); 3] = [
     (HEADLINE, "cruise-mps", ["acc", "mis"]),
     ("as-recorded/low-thw-overtake-as-recorded", "following-mps", ["acc", "mis"]),

@@ -109,7 +109,7 @@ fn map(scenario: &ScenarioOverview) -> io::Result<Markup> {
         p.note {
             "Of all pairs of parameters, " (across) " and " (up) " tell the most about the outcome. The darker a cell, the "
             "larger the share of its samples with a collision in the arm under test. Points are samples, drawn evenly from "
-            "those of each colour."
+            "the samples of each colour."
         }
         (fate_legend(scenario))
         p.legend {

@@ -37,7 +37,7 @@ impl ModeEstimate {
     ///       1  t  t²/2  0        r: share of the speed that remains, q: of the acceleration, s: of the slow error
     ///   F = 0  r  t     0
     ///       0  0  q     0        The state x becomes F·x, and its covariance P becomes F·P·Fᵀ. The zeros are left out;
-    ///       0  0  0     s        the order of the sums is that of the full products.
+    ///       0  0  0     s        the sums keep the order of the full products.
     /// ```
     pub(super) fn predict(&mut self, mode: &Mode, t: f64, remaining: &Remaining, slow_share: f64) {
         let Remaining { persistence, speed, .. } = *remaining;

@@ -146,7 +146,7 @@ fn own_group(mounts: &str, groups: &str) -> Option<PathBuf> {
 }
 
 /// Returns the root within the hierarchy and the mount point, if a line of `/proc/self/mountinfo`
-/// is that of cgroup v2: `30 23 0:26 / /sys/fs/cgroup rw,nosuid shared:4 - cgroup2 cgroup2 rw`.
+/// describes cgroup v2: `30 23 0:26 / /sys/fs/cgroup rw,nosuid shared:4 - cgroup2 cgroup2 rw`.
 fn cgroup2_mount(line: &str) -> Option<(&str, &str)> {
     let (mount, system) = line.split_once(" - ")?;
     let mut fields = mount.split(' ').skip(3);
