@@ -89,6 +89,7 @@ impl From<Regression> for ExitCode {
             Regression::None => Self::Pass,
             Regression::NewErrors | Regression::NotCompared => Self::SampleError,
             Regression::Worse => Self::Fail,
+            Regression::HoldsAlways => Self::Inconclusive,
         }
     }
 }

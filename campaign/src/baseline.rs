@@ -25,11 +25,11 @@ use serde_json::Value;
 use crate::compare::Regression;
 use crate::folder::{Folder, FolderError};
 use crate::folder_error::json_fault;
-use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
+use crate::margins::{MARGINS, Margin, MarginRegression, Quantiles, SMALLEST, cannot_regress, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
-const BASELINE_VERSION: u32 = 4;
+const BASELINE_VERSION: u32 = 5;
 
 /// The results of a campaign that a repository keeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,12 +68,24 @@ pub struct ScenarioBaseline {
     pub errors: u64,
     /// The samples in which vehicles collide or that end in an error, in ascending order.
     pub failing: Vec<u64>,
-    /// The samples that end in an error. Only a campaign has them: the file does not tell them from
-    /// the other failing ones.
-    #[serde(skip)]
+    /// The samples that end in an error, in ascending order.
     pub in_error: Vec<u64>,
     /// Quantiles of each margin, over the samples that have it (s or m).
-    pub margins: BTreeMap<String, BTreeMap<String, f64>>,
+    pub margins: BTreeMap<String, Quantiles>,
+}
+
+impl ScenarioBaseline {
+    /// Returns true if vehicles collide in the sample.
+    fn has_collision(&self, sample: u64) -> bool {
+        self.failing.contains(&sample) && !self.in_error.contains(&sample)
+    }
+
+    /// Returns true if no later campaign can be worse: each sample fails, and no margin can shrink
+    /// by more than the tolerance.
+    fn cannot_become_worse(&self, tolerance: f64) -> bool {
+        self.failing.len() as u64 == self.samples
+            && self.margins.values().all(|quantiles| cannot_regress(quantiles, tolerance))
+    }
 }
 
 /// The reason for which a campaign cannot be compared with a baseline.
@@ -219,7 +231,8 @@ impl Baseline {
             current: current.scenarios.get(name).map_or(0, |after| after.errors),
         };
         let not_compared = self.scenarios.iter().map(errors).filter(SampleErrors::hide_a_sample).collect();
-        Ok(BaselineComparison { scenarios: compared, new_scenarios, not_compared })
+        let holds_always = self.scenarios.values().all(|before| before.cannot_become_worse(tolerance));
+        Ok(BaselineComparison { scenarios: compared, new_scenarios, not_compared, holds_always })
     }
 }
 
@@ -229,24 +242,24 @@ fn compare(
     after: &ScenarioBaseline,
     tolerance: f64,
 ) -> ScenarioBaselineComparison {
-    let only_in = |one: &[u64], other: &[u64]| -> Vec<u64> {
-        one.iter().filter(|sample| !other.contains(sample)).copied().collect()
+    let of = |samples: &[u64], is_meant: &dyn Fn(u64) -> bool| -> Vec<u64> {
+        samples.iter().copied().filter(|&sample| is_meant(sample)).collect()
     };
-    let mut newly_failing = only_in(&after.failing, &before.failing);
-    newly_failing.retain(|sample| !after.in_error.contains(sample));
     let mut margins = Vec::new();
-    // The quantiles of other samples are not compared.
-    let has_all = before.errors == 0 && after.errors == 0;
-    for (margin, quantiles) in before.margins.iter().filter(|_| has_all) {
+    for (margin, quantiles) in before.margins.iter().filter(|_| before.errors == 0) {
         if let Some(now) = after.margins.get(margin) {
-            margins.extend(regressions(margin, quantiles, now, tolerance));
+            // The quantiles of fewer samples are others, but more samples do not raise the smallest
+            // value.
+            let is_comparable = |regression: &MarginRegression| after.errors == 0 || regression.quantile == SMALLEST;
+            margins.extend(regressions(margin, quantiles, now, tolerance).into_iter().filter(is_comparable));
         }
     }
     ScenarioBaselineComparison {
         scenario: name.to_owned(),
-        newly_failing,
-        // A sample that ended in an error is not fixed, and the file does not name it.
-        fixed: if before.errors == 0 { only_in(&before.failing, &after.failing) } else { Vec::new() },
+        // Without an outcome in the baseline, a collision counts as new.
+        newly_failing: of(&after.failing, &|sample| after.has_collision(sample) && !before.has_collision(sample)),
+        fixed: of(&before.failing, &|sample| before.has_collision(sample) && !after.failing.contains(&sample)),
+        newly_in_error: of(&after.in_error, &|sample| !before.in_error.contains(&sample)),
         margins,
     }
 }
@@ -261,6 +274,9 @@ pub struct BaselineComparison {
     /// Scenarios with samples that end in an error, in the baseline or in the later campaign. These
     /// samples are not compared.
     pub not_compared: Vec<SampleErrors>,
+    /// True if no campaign could be worse than the baseline, so that nothing is judged.
+    #[serde(skip)]
+    pub holds_always: bool,
 }
 
 /// The samples of a scenario that end in an error and are not compared.
@@ -277,8 +293,7 @@ pub struct SampleErrors {
 }
 
 impl SampleErrors {
-    /// Returns true if some sample is not compared. The file does not tell an error from a
-    /// collision: a sample that ended in an error there and collides now does not newly fail.
+    /// Returns true if some sample is not compared.
     const fn hide_a_sample(&self) -> bool {
         self.baseline > 0 || self.current > 0 || self.samples == 0
     }
@@ -287,14 +302,16 @@ impl SampleErrors {
 impl BaselineComparison {
     /// Returns whether the later campaign is worse.
     pub fn regression(&self) -> Regression {
-        if self.not_compared.iter().any(|errors| errors.current > errors.baseline) {
+        if self.scenarios.iter().any(|scenario| !scenario.newly_in_error.is_empty()) {
             Regression::NewErrors
         } else if self.is_regression() {
             Regression::Worse
-        } else if self.is_compared() {
-            Regression::None
-        } else {
+        } else if !self.is_compared() {
             Regression::NotCompared
+        } else if self.holds_always {
+            Regression::HoldsAlways
+        } else {
+            Regression::None
         }
     }
 
@@ -320,13 +337,15 @@ impl BaselineComparison {
 pub struct ScenarioBaselineComparison {
     /// The scenario's name.
     pub scenario: String,
-    /// Samples that pass in the baseline and in which vehicles collide in the later campaign.
+    /// Samples in which vehicles collide in the later campaign and not in the baseline.
     pub newly_failing: Vec<u64>,
-    /// Samples that fail in the baseline and pass in the later campaign; none if some ended in an
-    /// error in the baseline.
+    /// Samples in which vehicles collide in the baseline, and that pass in the later campaign.
     pub fixed: Vec<u64>,
-    /// The quantiles of margins that fell by more than the tolerance; none if a sample ends in an
-    /// error, because the quantiles are then over other samples.
+    /// Samples that end in an error in the later campaign and not in the baseline.
+    pub newly_in_error: Vec<u64>,
+    /// The quantiles of margins that fell by more than the tolerance. If a sample ends in an error,
+    /// the quantiles are over other samples: none then, or the smallest value if the baseline has
+    /// no errors.
     pub margins: Vec<MarginRegression>,
 }
 
@@ -370,6 +389,7 @@ impl Collected {
             }
         }
         self.result.failing.sort_unstable();
+        self.result.in_error.sort_unstable();
         self.result
     }
 }
@@ -415,8 +435,10 @@ mod tests {
     #[test]
     fn samples_that_end_in_an_error_on_either_side_are_not_compared() {
         let with_errors = |errors: u64| {
-            let mut baseline = baseline(&[0, 1, 2], 4.0);
-            baseline.scenarios.get_mut("headline").unwrap().errors = errors;
+            let in_error: Vec<u64> = (10 - errors..10).collect();
+            let mut baseline = baseline(&[&[0, 1, 2], &in_error[..]].concat(), 4.0);
+            let scenario = baseline.scenarios.get_mut("headline").unwrap();
+            (scenario.errors, scenario.in_error) = (errors, in_error);
             baseline
         };
         assert!(with_errors(0).compare(&with_errors(0), 0.05).unwrap().is_compared());
@@ -454,6 +476,47 @@ mod tests {
         assert_eq!(comparison.scenarios[0].newly_failing, [3]);
         assert_eq!(comparison.regression(), Regression::Worse);
         assert_eq!(compare(&fine, &collides).regression(), Regression::NewErrors);
+        let comparison = compare(&collides, &worse);
+        assert_eq!(comparison.regression(), Regression::NotCompared);
+        assert_eq!(comparison.scenarios[0].fixed, [3], "a sample that is fixed beside errors is named");
+        // As many errors as before, in another sample.
+        let comparison = compare(&worse, &with_errors(&[2, 5, 8], &[5, 8], 1.0));
+        assert_eq!(comparison.scenarios[0].newly_in_error, [8]);
+        assert_eq!(comparison.regression(), Regression::NewErrors);
+        let comparison = compare(&worse, &with_errors(&[2, 5], &[], 4.0));
+        assert_eq!(comparison.scenarios[0].newly_failing, [5], "without an outcome before, a collision is new");
+        assert_eq!(comparison.regression(), Regression::Worse);
+    }
+
+    #[test]
+    fn the_smallest_margin_of_fewer_samples_regresses_and_their_other_quantiles_are_not_compared() {
+        let with_quantiles = |gap_m: f64, in_error: &[u64]| {
+            let mut baseline = baseline(in_error, gap_m);
+            let scenario = baseline.scenarios.get_mut("headline").unwrap();
+            (scenario.errors, scenario.in_error) = (in_error.len() as u64, in_error.to_vec());
+            scenario.margins.values_mut().for_each(|quantiles| drop(quantiles.insert(SMALLEST.to_owned(), gap_m)));
+            baseline
+        };
+        let shrunk = |before: &[u64], after: &[u64]| {
+            let comparison = with_quantiles(4.0, before).compare(&with_quantiles(1.0, after), 0.05).unwrap();
+            comparison.scenarios[0].margins.iter().map(|margin| margin.quantile.clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(shrunk(&[], &[]), ["min", "p05"]);
+        assert_eq!(shrunk(&[], &[5]), ["min"], "a sample that is there shows it");
+        assert!(shrunk(&[5], &[5]).is_empty(), "the sample may have been as small before");
+    }
+
+    #[test]
+    fn a_comparison_in_which_nothing_can_become_worse_judges_nothing() {
+        let all: Vec<u64> = (0..10).collect();
+        let judged = |failing: &[u64], gap_m: f64, tolerance: f64| {
+            let baseline = baseline(failing, gap_m);
+            baseline.compare(&baseline, tolerance).unwrap().regression()
+        };
+        assert_eq!(judged(&all, 4.0, 1.0), Regression::HoldsAlways);
+        assert_eq!(judged(&all, 0.0, 0.05), Regression::HoldsAlways);
+        assert_eq!(judged(&all, 4.0, 0.05), Regression::None, "the margin may shrink");
+        assert_eq!(judged(&all[1..], 4.0, 1.0), Regression::None, "the sample 0 may newly fail");
     }
 
     #[test]
@@ -517,7 +580,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("baseline.json");
         let cases =
-            [("", "it is empty"), ("{\"a\": 1}", "of version 4"), ("a = 1", "is not a baseline: expected value")];
+            [("", "it is empty"), ("{\"a\": 1}", "of version 5"), ("a = 1", "is not a baseline: expected value")];
         for (text, expected) in cases {
             std::fs::write(&path, text).unwrap();
             let error = Baseline::read(&path).unwrap_err().to_string();

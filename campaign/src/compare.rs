@@ -8,7 +8,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use super::folder::{Folder, FolderError};
-use super::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
+use super::margins::{MARGINS, Margin, MarginRegression, cannot_regress, quantiles, regressions};
 use super::record::{ArmRecord, Record};
 
 /// The reason for which two campaigns cannot be compared.
@@ -89,6 +89,10 @@ impl MarginChange {
         regressions(self.key, &quantiles_of(&self.baseline), &quantiles_of(&self.current), tolerance)
     }
 
+    fn cannot_regress(&self, tolerance: f64) -> bool {
+        cannot_regress(&quantiles(&mut self.baseline.clone()), tolerance)
+    }
+
     fn push(&mut self, sample: u64, baseline: f64, current: f64) {
         self.samples += 1;
         self.baseline.push(baseline);
@@ -158,6 +162,18 @@ impl ScenarioComparison {
         self.margins.iter().flat_map(|margin| margin.regressions(tolerance)).collect()
     }
 
+    /// Returns true if a sample has an outcome in both campaigns, and each sample has one in the
+    /// later campaign.
+    fn is_compared(&self) -> bool {
+        self.outcomes == self.samples && (self.no_longer_in_error.len() as u64) < self.samples
+    }
+
+    /// Returns the number of samples in which no vehicle collides in the baseline: more cannot newly
+    /// fail.
+    const fn passing_before(&self) -> u64 {
+        self.samples - self.fixed.len() as u64 - self.still_failing
+    }
+
     fn push(&mut self, sample: u64, baseline: &ArmRecord, current: &ArmRecord) {
         self.samples += 1;
         self.outcomes += u64::from(current.result.is_ok());
@@ -211,6 +227,9 @@ pub enum Regression {
     NotCompared,
     /// More samples fail than allowed, or a margin has shrunk.
     Worse,
+    /// The campaign would not be worse whatever happened in its samples, so that nothing is judged:
+    /// as many samples may newly fail as there are, and each margin may fall to 0.
+    HoldsAlways,
 }
 
 impl Regression {
@@ -218,15 +237,28 @@ impl Regression {
     /// margin may fall by the share `tolerance`.
     pub fn of(scenarios: &[ScenarioComparison], max_newly_failing: u64, tolerance: f64) -> Self {
         let newly_failing: usize = scenarios.iter().map(|scenario| scenario.newly_failing.len()).sum();
+        let passing_before: u64 = scenarios.iter().map(ScenarioComparison::passing_before).sum();
         let has_lost_margin = scenarios.iter().any(|scenario| !scenario.margin_regressions(tolerance).is_empty());
+        let mut margins = scenarios.iter().flat_map(|scenario| &scenario.margins);
         if scenarios.iter().any(|scenario| !scenario.newly_in_error.is_empty()) {
             Self::NewErrors
         } else if newly_failing as u64 > max_newly_failing || has_lost_margin {
             Self::Worse
-        } else if scenarios.is_empty() || scenarios.iter().any(|scenario| scenario.outcomes < scenario.samples) {
+        } else if scenarios.is_empty() || !scenarios.iter().all(ScenarioComparison::is_compared) {
             Self::NotCompared
+        } else if passing_before <= max_newly_failing && margins.all(|margin| margin.cannot_regress(tolerance)) {
+            Self::HoldsAlways
         } else {
             Self::None
+        }
+    }
+
+    /// Returns the verdict for programs.
+    pub const fn verdict(self) -> &'static str {
+        match self {
+            Self::None => "PASS",
+            Self::NewErrors | Self::NotCompared | Self::Worse => "FAIL",
+            Self::HoldsAlways => "NOT JUDGED",
         }
     }
 }
@@ -238,6 +270,9 @@ impl fmt::Display for Regression {
             Self::NewErrors => "NEW ERRORS",
             Self::NotCompared => "NOT COMPARED",
             Self::Worse => "REGRESSION",
+            Self::HoldsAlways => {
+                "NOT JUDGED: the limits hold whatever happens in these samples: set one that can be missed"
+            }
         })
     }
 }
@@ -318,5 +353,29 @@ mod tests {
         assert_eq!(Regression::of(std::slice::from_ref(&compared), 0, 0.05), Regression::None);
         assert_eq!(Regression::of(&[compared, scenario], 0, 0.05), Regression::NotCompared);
         assert_eq!(Regression::of(&[], 0, 0.05), Regression::NotCompared);
+        let recovered: Vec<u64> = (0..4).collect();
+        let nothing_in_both =
+            ScenarioComparison { outcomes: 4, no_longer_in_error: recovered, ..ScenarioComparison::new("close") };
+        let nothing_in_both = ScenarioComparison { samples: 4, ..nothing_in_both };
+        assert_eq!(Regression::of(&[nothing_in_both], 0, 0.05), Regression::NotCompared);
+    }
+
+    #[test]
+    fn limits_that_no_sample_can_miss_judge_nothing() {
+        let with_gap = |gap_m: f64, still_failing: u64| {
+            let mut scenario =
+                ScenarioComparison { samples: 4, outcomes: 4, still_failing, ..ScenarioComparison::new("close") };
+            scenario.margins[0].push(0, gap_m, gap_m);
+            scenario
+        };
+        let judged = |scenario: ScenarioComparison, most, tolerance| Regression::of(&[scenario], most, tolerance);
+        assert_eq!(judged(with_gap(3.0, 0), 4, 1.0), Regression::HoldsAlways);
+        assert_eq!(judged(with_gap(3.0, 0), 3, 1.0), Regression::None, "all four may newly fail");
+        assert_eq!(judged(with_gap(3.0, 1), 3, 1.0), Regression::HoldsAlways, "one of four has failed before");
+        assert_eq!(judged(with_gap(3.0, 0), 1000, 0.9), Regression::None, "the margin may shrink");
+        assert_eq!(judged(with_gap(0.0, 4), 0, 0.05), Regression::HoldsAlways, "nothing can become worse");
+        let mut worse = with_gap(3.0, 0);
+        worse.newly_failing = vec![1, 2];
+        assert_eq!(judged(worse, 1, 1.0), Regression::Worse);
     }
 }

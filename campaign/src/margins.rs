@@ -23,9 +23,12 @@ pub(crate) const MARGINS: [Margin; 5] = [
     Margin { key: "min_ttc_rear_s", value: |margins| margins.min_ttc_rear_s },
 ];
 
+/// The quantile that is the smallest value.
+pub(crate) const SMALLEST: &str = "min";
+
 /// The probabilities of the quantiles that are compared. Small quantiles describe the runs closest
 /// to a collision.
-const PROBABILITIES: [(&str, f64); 4] = [("min", 0.0), ("p01", 0.01), ("p05", 0.05), ("p50", 0.5)];
+const PROBABILITIES: [(&str, f64); 4] = [(SMALLEST, 0.0), ("p01", 0.01), ("p05", 0.05), ("p50", 0.5)];
 
 /// A change of a margin up to this much is no regression (s or m): no report shows it.
 const SMALLEST_CHANGE: f64 = 0.01;
@@ -75,4 +78,11 @@ pub(crate) fn regressions(
         })
     };
     baseline.iter().filter_map(fallen).collect()
+}
+
+/// Returns true if no later campaign can regress: not even one in which all quantiles are 0, the
+/// smallest value of a margin.
+pub(crate) fn cannot_regress(baseline: &Quantiles, tolerance: f64) -> bool {
+    let smallest = baseline.keys().map(|quantile| (quantile.clone(), 0.0)).collect();
+    regressions("", baseline, &smallest, tolerance).is_empty()
 }

@@ -92,11 +92,12 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
 fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<ExitCode, CliError> {
     let (before, current) = (Baseline::read(file)?, Baseline::of(&Folder::open(dir))?);
     let comparison = before.compare(&current, tolerance)?;
-    let code = ExitCode::from(comparison.regression());
+    let regression = comparison.regression();
+    let code = ExitCode::from(regression);
     match format {
         Format::Json => {
             let object = json!({
-                "verdict": if code == ExitCode::Pass { "PASS" } else { "FAIL" },
+                "verdict": regression.verdict(),
                 "tolerance": tolerance,
                 "scenarios": comparison.scenarios,
                 "new_scenarios": comparison.new_scenarios,

@@ -56,7 +56,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
             outln!(
                 "{:#}",
                 stamped(
-                    json::comparison(&scenarios, &differences, args.tolerance, code == ExitCode::Pass),
+                    json::comparison(&scenarios, &differences, args.tolerance, regression.verdict()),
                     Some(current_manifest.sampling.seed),
                     None
                 )

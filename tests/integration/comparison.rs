@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::native_controllers::{compile, lib};
-use crate::support::{ROOT, closecall, code, folder, json, library, message, records, stderr, stdout};
+use crate::support::{ROOT, closecall, code, folder, json, library, message, program, records, stderr, stdout};
 
 fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
     let scenario = library("low-thw-overtake");
@@ -49,6 +49,11 @@ fn compare_names_newly_failing_and_fixed_samples() {
     assert!(text.contains(&format!("{} newly failing: {}", newly.len(), newly[0])), "{text}");
     let allowed = newly.len().to_string();
     stdout(&compare(&with, &without, &["--max-newly-failing", &allowed, "--tolerance", "1"]), 0);
+    // All of the samples may newly fail, and each margin may fall to 0.
+    let any = ["--max-newly-failing", "80", "--tolerance", "1"];
+    assert!(stdout(&compare(&with, &without, &any), 4).contains("NOT JUDGED: the limits hold whatever happens"));
+    let told = json(&compare(&with, &without, &[&any[..], &["--format", "json"]].concat()), 4);
+    assert_eq!(told["verdict"], "NOT JUDGED");
     // With the folders exchanged, the fixed samples are the newly failing ones.
     let back = json(&compare(&without, &with, &["--format", "json", "--tolerance", "1"]), i32::from(!fixed.is_empty()));
     assert_eq!(list(&back["scenarios"]["low-thw-overtake"]["newly_failing"]), fixed);
@@ -129,6 +134,61 @@ fn a_search_beyond_the_samples_of_two_campaigns_finds_a_regression_and_writes_it
     std::fs::write(out.join("rare-journal.jsonl"), &whole[..whole.len() / 2]).unwrap();
     stdout(&compare(&before, &after, &[&search[..], &["--resume"]].concat()), 1);
     assert!(journal(&out) == whole);
+}
+
+/// A controller that always accelerates, and ends in an error in a part of the samples: the larger its
+/// argument, the fewer.
+const PARTLY: &str = r#"echo '{"type":"hello","protocol":1}'
+read -r line
+sum=$(printf %s "$line" | cksum)
+[ $((${sum%% *} % $1)) = 0 ] && exit 1
+while read -r line; do echo '{"acceleration_mps2":2.0,"state":"following"}'; done
+"#;
+
+#[test]
+fn errors_decide_about_a_comparison_with_a_baseline_and_hide_neither_a_fix_nor_a_regression() {
+    let folder = folder();
+    std::fs::write(folder.path().join("partly.sh"), PARTLY).unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let run = |name: &str, controller: &str, expected: i32| {
+        let words =
+            "campaign overtake-without-brake -n 12 --seed 1 --sensors ground-truth --no-gate --record failures:0";
+        let more = ["--controller", controller, "--controller-timeout-ms", "60000", "--out", name];
+        let output = program().current_dir(folder.path()).args(words.split(' ')).args(more).output().unwrap();
+        stdout(&output, expected);
+        stdout(&closecall(["baseline", "save", &at(name), &at(&format!("{name}.json"))]), 0);
+    };
+    let against = |current: &str, baseline: &str, more: &[&str]| {
+        let (folder, file) = (at(current), at(&format!("{baseline}.json")));
+        closecall(["baseline", "compare", &folder, &file].iter().chain(more))
+    };
+    run("fine", "mis", 0);
+    run("partly", "exec:sh partly.sh 3", 5);
+    run("colliding", "exec:sh partly.sh 4294967296", 0);
+    let list = |comparison: &Value, key: &str| {
+        let values = comparison["scenarios"][0][key].as_array().unwrap().iter();
+        values.map(|value| value.as_u64().unwrap()).collect::<Vec<_>>()
+    };
+    let changes =
+        |current: &str, baseline: &str, expected| json(&against(current, baseline, &["--format", "json"]), expected);
+    let worse = changes("partly", "fine", 5);
+    let (newly, errors) = (list(&worse, "newly_failing"), list(&worse, "newly_in_error"));
+    assert!(!newly.is_empty() && !errors.is_empty() && newly.len() + errors.len() == 12, "{worse}");
+    let text = stdout(&against("partly", "fine", &[]), 5);
+    assert!(
+        text.contains("NEW ERRORS") && text.contains(&format!("{} newly failing: {}", newly.len(), newly[0])),
+        "{text}"
+    );
+    let mended = changes("fine", "partly", 5);
+    assert_eq!((list(&mended, "fixed"), list(&mended, "newly_failing")), (newly, Vec::new()), "{mended}");
+    assert!(stdout(&against("fine", "partly", &[]), 5).contains("NOT COMPARED"));
+    assert!(stdout(&against("partly", "partly", &[]), 5).contains("NOT COMPARED"));
+    // A collision in a sample without an outcome before is a regression.
+    assert_eq!(list(&changes("colliding", "partly", 1), "newly_failing"), errors);
+    // Where every sample fails and each margin may fall to 0, nothing can become worse.
+    let any = &["--tolerance", "1"][..];
+    assert!(stdout(&against("colliding", "colliding", any), 4).contains("NOT JUDGED"));
+    assert!(stdout(&against("fine", "fine", any), 0).contains("NO REGRESSION"));
 }
 
 /// The command that repeats a case names the file of a controller, not its name in reports.

@@ -69,10 +69,14 @@ pub struct BaselineText<'a>(pub &'a BaselineComparison);
 
 impl fmt::Display for BaselineText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for ScenarioBaselineComparison { scenario, newly_failing, fixed, margins } in &self.0.scenarios {
+        for ScenarioBaselineComparison { scenario, newly_failing, fixed, newly_in_error, margins } in &self.0.scenarios
+        {
             writeln!(f, "{scenario}")?;
             write_list(f, "newly failing", newly_failing)?;
             write_list(f, "fixed", fixed)?;
+            if !newly_in_error.is_empty() {
+                write_list(f, "newly in error", newly_in_error)?;
+            }
             for MarginRegression { margin, quantile, baseline, current } in margins {
                 writeln!(f, "  {margin} {quantile}: {baseline:.3} in the baseline, now {current:.3}")?;
             }

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 /// Returns the changes from one campaign to a later one, by scenario. `differences` are the
 /// differences of the two manifests, `tolerance` is the share by which a quantile of a margin may
 /// fall, and `is_pass` says whether the later campaign is accepted.
-pub fn comparison(scenarios: &[ScenarioComparison], differences: &[String], tolerance: f64, is_pass: bool) -> Value {
+pub fn comparison(scenarios: &[ScenarioComparison], differences: &[String], tolerance: f64, verdict: &str) -> Value {
     let scenario = |scenario: &ScenarioComparison| {
         let margins: Map<String, Value> = scenario
             .margins
@@ -38,7 +38,7 @@ pub fn comparison(scenarios: &[ScenarioComparison], differences: &[String], tole
         (scenario.scenario.clone(), object)
     };
     json!({
-        "verdict": if is_pass { "PASS" } else { "FAIL" },
+        "verdict": verdict,
         "differences": differences,
         "tolerance": tolerance,
         "scenarios": scenarios.iter().map(scenario).collect::<Map<String, Value>>(),
