@@ -149,6 +149,10 @@ pub struct ArmCounts {
     /// Samples with an outcome only because they were run again after their process had crashed or
     /// hung (`--retry-crashed`).
     pub flaky: u64,
+    /// Runs for whose validity checks there is a result.
+    pub checked: u64,
+    /// Runs that were chosen for the validity checks and have a check without a result.
+    pub not_checked: u64,
     /// Samples in which the margin increase system engages.
     pub engagements: u64,
     /// Engagements whose goal is in reach.
@@ -236,6 +240,8 @@ impl ArmCounts {
         self.imposed += other.imposed;
         self.errors += other.errors;
         self.flaky += other.flaky;
+        self.checked += other.checked;
+        self.not_checked += other.not_checked;
         self.engagements += other.engagements;
         self.goals_in_reach += other.goals_in_reach;
         self.unavailable += other.unavailable;

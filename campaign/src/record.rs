@@ -39,21 +39,40 @@ pub struct Flaky {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NobodyComing {
     /// The largest amount by which the ego was slower than its lead vehicle in either run (m/s);
-    /// `None` if one of them ended in an error.
+    /// `None` if one of them ended in an error, or both took too long.
     pub deficit_mps: Option<f64>,
+    /// True if one of the runs took too long, or its process failed, so that it has no result.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_late: bool,
 }
 
 impl NobodyComing {
+    /// A run that took too long.
+    pub(crate) const LATE: Self = Self { deficit_mps: None, is_late: true };
+
+    /// Returns a run with its result: by how much the ego was slower than its lead vehicle (m/s), or
+    /// `None` if its controller failed.
+    pub(crate) const fn of(deficit_mps: Option<f64>) -> Self {
+        Self { deficit_mps, is_late: false }
+    }
+
     /// Returns the worse of two runs.
     pub(crate) fn worse(self, other: Self) -> Self {
-        Self { deficit_mps: self.deficit_mps.zip(other.deficit_mps).map(|(one, another)| one.max(another)) }
+        let deficit_mps = match (self.deficit_mps, other.deficit_mps) {
+            (Some(one), Some(another)) => Some(one.max(another)),
+            (Some(one), None) if other.is_late => Some(one),
+            (None, Some(another)) if self.is_late => Some(another),
+            _ => None,
+        };
+        Self { deficit_mps, is_late: self.is_late || other.is_late }
     }
 
     /// Returns true if the ego slowed down by more than it does with the baseline, or its
-    /// controller failed.
+    /// controller failed. A run that took too long does not say so.
     pub fn is_slowed(self, baseline: Option<Self>) -> bool {
         let baseline_mps = baseline.and_then(|baseline| baseline.deficit_mps).unwrap_or(0.0);
-        self.deficit_mps.is_none_or(|deficit_mps| deficit_mps > SLOWED_MPS + baseline_mps.max(0.0))
+        let most_mps = SLOWED_MPS + baseline_mps.max(0.0);
+        self.deficit_mps.map_or(!self.is_late, |deficit_mps| deficit_mps > most_mps)
     }
 }
 
@@ -86,7 +105,9 @@ impl ArmRecord {
     /// Returns true if there is no outcome, or a check of the outcome took too long: another run
     /// may be complete.
     pub fn is_incomplete(&self) -> bool {
-        self.result.is_err() || self.checks.as_ref().is_some_and(|checks| checks.not_checked.is_some())
+        self.result.is_err()
+            || self.checks.as_ref().is_some_and(|checks| checks.not_checked.is_some())
+            || self.nobody_behind.is_some_and(|nobody_behind| nobody_behind.is_late)
     }
 
     /// Returns the contribution of this arm to the counts, before the validity checks are taken

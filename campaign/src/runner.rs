@@ -14,7 +14,7 @@ use super::attribution;
 use super::host;
 use super::identity::Identity;
 use super::partition::Partition;
-use super::record::{ArmRecord, SampleFailure};
+use super::record::{ArmRecord, NobodyComing, SampleFailure};
 use super::validity::{ArmChecks, CheckPlan, CheckedRun};
 use super::workers::Samples;
 
@@ -111,6 +111,9 @@ impl Work {
         let [is_checked, is_attributed] =
             [self.checks.includes(key), attribution::includes(&self.file.config().requirements, key)];
         if let (Ok(run), Ok(outcome), true) = (&run, done.record.result.clone(), is_checked || is_attributed) {
+            // What stays if a run without vehicles behind takes too long.
+            let is_followed = is_attributed && run.scenario.with_nobody_behind().is_some();
+            done.record.nobody_behind = is_followed.then_some(NobodyComing::LATE);
             on_outcome(&done);
             done.record.checks = is_checked.then(|| run.check(&outcome));
             done.record.nobody_behind = is_attributed.then(|| run.with_nobody_coming()).flatten();

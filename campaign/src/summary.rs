@@ -73,6 +73,10 @@ impl Counts {
             if let Some(checks) = &arm.checks {
                 let run = RunOfScenario { sample: record.sample, arm: index };
                 self.checks.push(run, checks, outcome.ego_collided());
+                if let Some(counts) = self.arms.get_mut(index) {
+                    counts.checked += u64::from(checks.not_checked.is_none());
+                    counts.not_checked += u64::from(checks.not_checked.is_some());
+                }
             }
         }
         if let [before @ .., tested] = &record.arms[..]

@@ -26,7 +26,7 @@ use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
 use super::ledger::ArmCounts;
 use super::probability::{Answer, Finding};
-use super::summary::Summary;
+use super::summary::{Counts, Summary};
 use super::validity::{CheckCounts, Invariance, RunOfScenario};
 
 /// Share of the outcomes in which the system under test may not be available for some time, and the
@@ -60,6 +60,10 @@ pub enum Verdict {
     #[serde(rename = "INVALID")]
     Invalid,
 }
+
+/// What a limit says that the samples cannot miss.
+const HOLDS_ALWAYS: &str =
+    "which holds whatever happens in these samples, and says nothing of them: set a limit that can be missed";
 
 impl Verdict {
     /// Returns the word for reports.
@@ -149,7 +153,7 @@ pub struct Judgement {
     pub probabilities: Vec<(String, Finding)>,
     /// What the samples of each scenario cover, if the scenario states what is to be covered.
     pub coverage: Vec<(String, Vec<CoverageResult>)>,
-    /// The gate on the number of flaky samples, if there is one.
+    /// The gate on the number of flaky samples, if there is one that can be missed.
     pub flaky: Option<FlakyGate>,
 }
 
@@ -244,10 +248,10 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     if summary.is_unchecked {
         findings.note("the validity of the simulator was not checked: the checks were switched off".to_owned());
     }
-    let flaky = judge_flaky(total.flaky(), allowed.max_flaky, &mut findings);
+    let flaky = judge_flaky(&total, allowed.max_flaky, &mut findings);
     judge_validity(summary, &total.checks, allowed.max_flip_rate, &mut findings);
     let expectations = judge_expectations(judge, &mut findings);
-    let unattributed = judge_attribution(summary, &mut findings);
+    let attributed = judge_attribution(summary, &mut findings);
     judge_samples(summary, judge, &mut findings);
     judge_action(judge, &mut findings);
     for (name, weakened) in judge.overridden() {
@@ -274,9 +278,9 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
         findings.add(Decision::Inconclusive, reason);
     }
     let mut requirements = judge.requirements(&gates);
-    for missed in requirements.iter_mut().filter(|missed| missed.mark == attribution::REQUIREMENT) {
-        if unattributed.contains(&missed.scenario.as_str()) {
-            missed.standing = Standing::Fail;
+    for requirement in requirements.iter_mut().filter(|requirement| requirement.mark == attribution::REQUIREMENT) {
+        for (_, standing) in attributed.iter().filter(|(name, _)| *name == requirement.scenario) {
+            requirement.standing = requirement.standing.max(*standing);
         }
     }
     let has_criteria = |requirement: &RequirementResult| {
@@ -351,13 +355,18 @@ fn missing_judgement(gates: &[GateResult]) -> &'static str {
     }
 }
 
-fn judge_flaky(flaky: u64, max: Option<u64>, findings: &mut Findings) -> Option<FlakyGate> {
+fn judge_flaky(total: &Counts, max: Option<u64>, findings: &mut Findings) -> Option<FlakyGate> {
+    let (flaky, runs) = (total.flaky(), total.arms.iter().map(|arm| arm.outcomes).sum::<u64>());
     let Some(gate) = max.map(|max| FlakyGate { flaky, max }) else {
         if flaky > 0 {
             findings.note(format!("flaky: {} succeeded only in another process", samples(flaky)));
         }
         return None;
     };
+    if gate.max > 0 && gate.max >= runs {
+        findings.add(Decision::Inconclusive, format!("{gate}, {HOLDS_ALWAYS}"));
+        return None;
+    }
     if gate.is_met() {
         // Nothing was run again: there is nothing to say.
         if flaky > 0 {
@@ -378,16 +387,24 @@ fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, f
             counted(checks.not_checked + checks.runs, "run"),
             was(checks.not_checked + checks.runs)
         );
-        if checks.runs == 0 { findings.add(Decision::Inconclusive, sentence) } else { findings.note(sentence) }
+        // The checks of the other arms and scenarios say nothing of these.
+        match &without_check(summary)[..] {
+            [] => findings.note(sentence),
+            runs => findings.add(Decision::Inconclusive, format!("{sentence}: none of {}", runs.join(", "))),
+        }
     }
     for (check, count) in checks.broken() {
         let first = first_refuted(summary, check);
         findings.add(Decision::Invalid, format!("{}: {} of {} checked{first}", check.finding(), count, checks.runs));
     }
+    let allowed = allowed_flips(max_flip_rate, checks.runs);
+    if max_flip_rate > MAX_FLIP_RATE && checks.runs > 0 && allowed >= checks.runs {
+        let limit = format!("{} of {} checked verdicts may flip at half the time step", allowed, checks.runs);
+        findings.add(Decision::Inconclusive, format!("{limit}, {HOLDS_ALWAYS}"));
+    }
     if checks.flips == 0 {
         return;
     }
-    let allowed = allowed_flips(max_flip_rate, checks.runs);
     let sentence = format!(
         "{} of {} checked verdicts flipped at half the time step, {allowed} allowed ({} of them, rounded up)",
         checks.flips,
@@ -395,6 +412,17 @@ fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, f
         percent(max_flip_rate)
     );
     if checks.flips > allowed { findings.add(Decision::Invalid, sentence) } else { findings.note(sentence) }
+}
+
+/// Returns the scenarios and arms that have no result among the runs chosen for the validity checks,
+/// in words.
+fn without_check(summary: &Summary) -> Vec<String> {
+    let arms = |(name, counts): &(String, Counts)| -> Vec<String> {
+        let arms = counts.arms.iter().zip(&summary.controllers);
+        let unchecked = arms.filter(|(counts, _)| counts.not_checked > 0 && counts.checked == 0);
+        unchecked.map(|(_, controller)| format!("{name} with {controller}")).collect()
+    };
+    summary.scenarios.iter().flat_map(arms).collect()
 }
 
 /// Returns which run a check refutes first, and its likely cause.
@@ -423,19 +451,26 @@ fn judge_expectations(judge: &Judge, findings: &mut Findings) -> Vec<Expectation
     expectations
 }
 
-/// Returns the scenarios in which the ego slows down without a vehicle behind.
-fn judge_attribution<'a>(summary: &'a Summary, findings: &mut Findings) -> Vec<&'a str> {
-    let mut unattributed = Vec::new();
-    for (name, counts) in summary.scenarios.iter().filter(|(_, counts)| counts.attribution.slowed > 0) {
-        let sentence = format!("{name} ({}): {}", attribution::REQUIREMENT, counts.attribution.sentence());
-        if counts.attribution.is_missed() {
-            findings.add(Decision::Fail, sentence);
-            unattributed.push(name.as_str());
-        } else {
-            findings.background(sentence);
+/// Returns the scenarios in which the ego slows down without a vehicle behind, or in which the runs
+/// that show it have no result.
+fn judge_attribution<'a>(summary: &'a Summary, findings: &mut Findings) -> Vec<(&'a str, Standing)> {
+    let mut attributed = Vec::new();
+    for (name, Counts { attribution, .. }) in &summary.scenarios {
+        let of_scenario = |sentence: String| format!("{name} ({}): {sentence}", attribution::REQUIREMENT);
+        if attribution.is_missed() {
+            findings.add(Decision::Fail, of_scenario(attribution.sentence()));
+            attributed.push((name.as_str(), Standing::Fail));
+        } else if attribution.slowed > 0 {
+            findings.background(of_scenario(attribution.sentence()));
+        }
+        if attribution.is_undecided() {
+            findings.add(Decision::Inconclusive, of_scenario(attribution.not_checked_sentence()));
+            attributed.push((name.as_str(), Standing::Inconclusive));
+        } else if attribution.not_checked > 0 {
+            findings.background(of_scenario(attribution.not_checked_sentence()));
         }
     }
-    unattributed
+    attributed
 }
 
 /// Says which parameters are sampled beyond what trajectory data show: the verdict is then one on

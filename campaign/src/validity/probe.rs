@@ -37,13 +37,13 @@ impl CheckedRun<'_> {
     }
 
     /// Runs this sample without the vehicles behind the ego, and with vehicles behind that do not
-    /// approach. `None` if nobody is behind, if both runs took too long, or if nothing was measured
-    /// in them.
+    /// approach. `None` if nobody is behind, or if nothing was measured in these runs.
     pub(crate) fn with_nobody_coming(&self) -> Option<NobodyComing> {
         let changed = [self.scenario.with_nobody_behind()?, self.scenario.with_nobody_approaching()?];
         let measured = changed.iter().filter_map(|scenario| match self.run(scenario, self.arm) {
-            Ok(outcome) => outcome.cost.map(|cost| NobodyComing { deficit_mps: Some(cost.unprompted_deficit_mps) }),
-            Err(error) => (!error.is_late()).then_some(NobodyComing { deficit_mps: None }),
+            Ok(outcome) => outcome.cost.map(|cost| NobodyComing::of(Some(cost.unprompted_deficit_mps))),
+            Err(error) if error.is_late() => Some(NobodyComing::LATE),
+            Err(_) => Some(NobodyComing::of(None)),
         });
         measured.reduce(NobodyComing::worse)
     }

@@ -37,6 +37,71 @@ fn a_system_that_is_not_available_in_most_samples_is_not_tested_whether_it_engag
     assert!(availability(0, 0).reasons.is_empty());
 }
 
+/// Returns a paired campaign of one scenario whose counts are changed.
+fn paired(change: impl FnOnce(&mut Counts)) -> Summary {
+    let mut summary = Summary::new(vec!["acc".to_owned(), "own".to_owned()], ["close".to_owned()]);
+    let (_, counts) = &mut summary.scenarios[0];
+    counts.arms.iter_mut().for_each(|arm| arm.outcomes = 20);
+    change(counts);
+    summary
+}
+
+#[test]
+fn checks_of_the_baseline_do_not_stand_for_checks_of_the_arm_under_test() {
+    let judged = |checked: [u64; 2], not_checked: [u64; 2]| {
+        let summary = paired(|counts| {
+            for (arm, (checked, not_checked)) in counts.arms.iter_mut().zip(checked.into_iter().zip(not_checked)) {
+                (arm.checked, arm.not_checked) = (checked, not_checked);
+            }
+            (counts.checks.runs, counts.checks.not_checked) = (checked.iter().sum(), not_checked.iter().sum());
+        });
+        let mut findings = Findings::default();
+        judge_validity(&summary, &summary.total().checks, MAX_FLIP_RATE, &mut findings);
+        findings
+    };
+    let unchecked = judged([2, 0], [0, 2]);
+    assert_eq!(unchecked.decisions(), [Decision::Inconclusive]);
+    assert!(unchecked.reasons[0].text.ends_with(": none of close with own"), "{}", unchecked.reasons[0].text);
+    assert_eq!(judged([0, 0], [2, 2]).decisions(), [Decision::Inconclusive]);
+    assert!(judged([2, 1], [0, 1]).decisions().is_empty(), "one of two is checked, and the other one is named");
+    assert!(judged([2, 2], [0, 0]).reasons.is_empty());
+}
+
+#[test]
+fn runs_without_vehicles_behind_that_take_too_long_do_not_meet_the_requirement() {
+    let judged = |runs: u64, not_checked: u64| {
+        let summary = paired(|counts| {
+            (counts.attribution.runs, counts.attribution.not_checked) = (runs, not_checked);
+        });
+        let mut findings = Findings::default();
+        let standings: Vec<Standing> =
+            judge_attribution(&summary, &mut findings).into_iter().map(|(_, standing)| standing).collect();
+        (findings.decisions(), standings)
+    };
+    assert_eq!(judged(0, 2), (vec![Decision::Inconclusive], vec![Standing::Inconclusive]));
+    assert_eq!(judged(12, 1), (vec![], vec![]));
+    assert_eq!(judged(2, 0), (vec![], vec![]));
+}
+
+#[test]
+fn a_limit_of_flaky_samples_or_flips_that_cannot_be_missed_is_open() {
+    let flaky = |max: u64| {
+        let mut findings = Findings::default();
+        judge_flaky(&paired(|_| ()).total(), Some(max), &mut findings);
+        findings.decisions()
+    };
+    assert!(flaky(0).is_empty() && flaky(39).is_empty(), "20 samples in two arms");
+    assert_eq!(flaky(40), [Decision::Inconclusive]);
+    let flips = |rate: f64, runs: u64| {
+        let mut findings = Findings::default();
+        let checks = CheckCounts { runs, ..CheckCounts::default() };
+        judge_validity(&paired(|_| ()), &checks, rate, &mut findings);
+        findings.decisions()
+    };
+    assert!(flips(MAX_FLIP_RATE, 1).is_empty() && flips(0.5, 4).is_empty());
+    assert_eq!([flips(1.0, 4), flips(0.9, 4)], [[Decision::Inconclusive], [Decision::Inconclusive]]);
+}
+
 #[test]
 fn several_scenarios_without_an_available_system_are_one_remark() {
     let findings = availability_in(&["dead", "frozen"], 6, 2);
