@@ -9,17 +9,24 @@
 //!
 //! Between the hashes, a file counts as unchanged if its time of change, its length and its place
 //! on the disk are the same.
+//!
+//! The folder of the campaign keeps what has changed. The samples of the changed controller stay in
+//! its journal: a campaign that is resumed, or whose parts are merged, is no better for it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use closecall_sensors::external::ProgramKind;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::ExecSettings;
+use closecall_traffic::atomic::{WriteError, write_file};
+use closecall_traffic::input::read_text;
 
 use crate::fingerprint::{Fingerprint, command_settings, named_files};
+use crate::folder::{CONTROLLER_CHANGES, Folder, FolderError};
 use crate::manifest::{Manifest, file_hash};
 
 /// Shortest time between two looks at the files.
@@ -55,75 +62,128 @@ struct Watched {
 pub struct ControllerWatch {
     files: BTreeMap<PathBuf, Watched>,
     looked: Instant,
-    changed: BTreeSet<PathBuf>,
+    /// What has changed, in words, also in an earlier part of the campaign.
+    changes: BTreeSet<String>,
+    /// The folder of the campaign, if it has one.
+    folder: Option<Folder>,
 }
 
 impl ControllerWatch {
-    /// Hashes the files of the controllers of a campaign that begins.
-    pub fn start(manifest: &Manifest) -> Self {
-        let folder = manifest.controller_folder();
-        let mut paths: BTreeSet<PathBuf> = BTreeSet::new();
-        for arm in &manifest.arms {
-            let named: Vec<PathBuf> = match arm {
-                ControllerChoice::Exec(exec) => command_files(exec, folder),
-                ControllerChoice::Native(native) => vec![in_folder(folder, Path::new(&native.path))],
-                ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => continue,
-            };
-            paths.extend(imports(&named, folder));
-            paths.extend(named);
-        }
-        for program in manifest.programs() {
-            let named = match program.kind {
-                ProgramKind::Exec => command_files(&command_settings(&program), folder),
-                ProgramKind::Lib => vec![in_folder(folder, Path::new(program.command))],
-                ProgramKind::Hosted => continue,
-            };
-            paths.extend(imports(&named, folder));
-            paths.extend(named);
-        }
-        let is_small =
-            |path: &&PathBuf| path.metadata().is_ok_and(|file| file.is_file() && file.len() <= MOST_OPEN_BYTES);
-        let open = manifest.controllers.iter().flat_map(Fingerprint::open_files);
-        paths.extend(open.filter(is_small).cloned());
-        let watched = |path: PathBuf| {
-            let (hash, look) = (hash(&path), look(&path));
-            (path, Watched { hash, look })
-        };
-        let files = paths.into_iter().map(watched).collect();
-        Self { files, looked: Instant::now(), changed: BTreeSet::new() }
-    }
-
-    /// Returns a watch of no files.
-    pub fn of_no_files() -> Self {
-        Self { files: BTreeMap::new(), looked: Instant::now(), changed: BTreeSet::new() }
+    /// Hashes the files of the controllers of a campaign that begins or is resumed, and reads what
+    /// has changed before from its folder. Without a manifest no files are watched.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the changes before cannot be read.
+    pub fn start(manifest: Option<&Manifest>, folder: Option<&Folder>) -> Result<Self, FolderError> {
+        let files = manifest.map(watched_files).unwrap_or_default();
+        let changes = folder.map(kept_changes).transpose()?.unwrap_or_default();
+        Ok(Self { files, looked: Instant::now(), changes: changes.into_iter().collect(), folder: folder.cloned() })
     }
 
     /// Looks at the files, at most once in a second.
     pub fn look(&mut self) {
         if self.looked.elapsed() >= LOOK_EVERY {
             self.looked = Instant::now();
+            let before = self.changes.len();
             for (path, watched) in &mut self.files {
                 let now = look(path);
                 if now != watched.look {
                     watched.look = now;
                     if hash(path) != watched.hash {
-                        self.changed.insert(path.clone());
+                        self.changes.insert(change_of(path));
                     }
                 }
+            }
+            if self.changes.len() > before {
+                // What cannot be written now is written, or said, at the end.
+                let _ = self.keep();
             }
         }
     }
 
-    /// Hashes the files again. Returns a message for each file that differs from the start, or
-    /// differed in between.
-    pub fn finish(mut self) -> Vec<String> {
-        self.changed
-            .extend(self.files.iter().filter(|(path, file)| hash(path) != file.hash).map(|(path, _)| path.clone()));
-        let message = |path: &PathBuf| {
-            format!("the controller changed during the campaign: {} is not what it was at the start", path.display())
-        };
-        self.changed.iter().map(message).collect()
+    fn keep(&self) -> Result<Vec<String>, WriteError> {
+        let changes: Vec<String> = self.changes.iter().cloned().collect();
+        self.folder.as_ref().map_or(Ok(()), |folder| keep_changes(folder, &changes))?;
+        Ok(changes)
     }
+
+    /// Hashes the files again, and keeps what has changed in the folder. Returns a message for each
+    /// file that differs from the start, or differed in between.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the folder cannot keep it.
+    pub fn finish(mut self) -> Result<Vec<String>, WriteError> {
+        let differs = |(path, file): &(&PathBuf, &Watched)| hash(path) != file.hash;
+        self.changes.extend(self.files.iter().filter(differs).map(|(path, _)| change_of(path)));
+        self.keep()
+    }
+}
+
+/// Returns the files of the controllers of a campaign.
+fn watched_files(manifest: &Manifest) -> BTreeMap<PathBuf, Watched> {
+    let folder = manifest.controller_folder();
+    let mut paths: BTreeSet<PathBuf> = BTreeSet::new();
+    for arm in &manifest.arms {
+        let named: Vec<PathBuf> = match arm {
+            ControllerChoice::Exec(exec) => command_files(exec, folder),
+            ControllerChoice::Native(native) => vec![in_folder(folder, Path::new(&native.path))],
+            ControllerChoice::BuiltIn(_) | ControllerChoice::Tuned(_) | ControllerChoice::Hosted(_) => continue,
+        };
+        paths.extend(imports(&named, folder));
+        paths.extend(named);
+    }
+    for program in manifest.programs() {
+        let named = match program.kind {
+            ProgramKind::Exec => command_files(&command_settings(&program), folder),
+            ProgramKind::Lib => vec![in_folder(folder, Path::new(program.command))],
+            ProgramKind::Hosted => continue,
+        };
+        paths.extend(imports(&named, folder));
+        paths.extend(named);
+    }
+    let is_small = |path: &&PathBuf| path.metadata().is_ok_and(|file| file.is_file() && file.len() <= MOST_OPEN_BYTES);
+    let open = manifest.controllers.iter().flat_map(Fingerprint::open_files);
+    paths.extend(open.filter(is_small).cloned());
+    let watched = |path: PathBuf| {
+        let (hash, look) = (hash(&path), look(&path));
+        (path, Watched { hash, look })
+    };
+    paths.into_iter().map(watched).collect()
+}
+
+fn change_of(path: &Path) -> String {
+    format!("the controller changed during the campaign: {} is not what it was at the start", path.display())
+}
+
+/// Returns what changed of the controllers while the campaign of a folder ran, in words.
+///
+/// # Errors
+/// [`FolderError`] if the file cannot be read.
+pub fn kept_changes(folder: &Folder) -> Result<Vec<String>, FolderError> {
+    let path = folder.file(CONTROLLER_CHANGES);
+    match read_text(&path) {
+        Ok(text) => serde_json::from_str(&text).map_err(|error| FolderError::Content {
+            line: error.line(),
+            message: error.to_string(),
+            path,
+        }),
+        Err(source) if source.kind() == ErrorKind::NotFound => Ok(Vec::new()),
+        Err(source) => Err(FolderError::Read { path, source }),
+    }
+}
+
+/// Writes what changed of the controllers into the folder of a campaign, if anything did.
+///
+/// # Errors
+/// [`WriteError`] if the file cannot be written.
+pub fn keep_changes(folder: &Folder, changes: &[String]) -> Result<(), WriteError> {
+    if changes.is_empty() {
+        return Ok(());
+    }
+    write_file(&folder.file(CONTROLLER_CHANGES), |out| {
+        serde_json::to_writer_pretty(&mut *out, changes)?;
+        out.write_all(b"\n")
+    })
 }
 
 fn in_folder(folder: Option<&Path>, path: &Path) -> PathBuf {

@@ -16,6 +16,7 @@
 //!  explorer.html      the explorer as a file, if it was asked for
 //!  fidelity/          the folder of the same campaign with fast sensors, if it was asked for
 //!  fidelity.json      the rates that the fast samples have sharpened
+//!  controller-changes.json   what changed of the controllers while the campaign ran, if anything did
 //! ```
 
 use std::fs;
@@ -58,9 +59,10 @@ pub const RECORDINGS_PAGE: &str = "index.html";
 pub const FAST_SAMPLES: &str = "fidelity";
 /// The file with the rates that the fast samples have sharpened, in a campaign's folder.
 pub const FIDELITY_FILE: &str = "fidelity.json";
+pub(crate) const CONTROLLER_CHANGES: &str = "controller-changes.json";
 
 /// All files of a campaign's folder, without its recordings and its fast samples.
-pub(crate) const FILES: [&str; 15] = [
+pub(crate) const FILES: [&str; 16] = [
     MANIFEST,
     JOURNAL,
     AHEAD,
@@ -76,6 +78,7 @@ pub(crate) const FILES: [&str; 15] = [
     "causes.json",
     EXPLORER,
     FIDELITY_FILE,
+    CONTROLLER_CHANGES,
 ];
 
 /// The files that are made from the journal.

@@ -637,8 +637,8 @@ pub(super) fn carry_out(
     campaign.remote = connect(planned.ray, &manifest).map_err(CampaignError::from)?;
     let mut results = Results::start(planned.results, &mut campaign, &manifest)?;
     // Other machines run the files that were shipped at the start.
-    let mut watch =
-        if planned.ray.is_some() { ControllerWatch::of_no_files() } else { ControllerWatch::start(&manifest) };
+    let watched = planned.ray.is_none().then_some(&manifest);
+    let mut watch = ControllerWatch::start(watched, results.locked.as_ref().map(|locked| &locked.folder))?;
     if let Some(folder) = results.complete() {
         companion.begin(folder)?;
     }
@@ -675,6 +675,7 @@ pub(super) fn carry_out(
         ending = session::received().map(Ending::Signal);
     }
     if let Some(ending) = ending {
+        watch.finish()?;
         let kept = results.locked.as_ref().map(|locked| locked.folder.path());
         // Samples that still wait for their turn are done, too.
         ahead.waiting().for_each(|record| progress.tally.summary.push(record));
@@ -688,7 +689,7 @@ pub(super) fn carry_out(
     }
     let tally = &progress.tally;
     let mut judged = tally.judgement();
-    judged.add_invalid(watch.finish());
+    judged.add_invalid(watch.finish()?);
     let remarks =
         [known_seed(judged.has_gates(), &manifest, planned.can_draw_seed), part_only(judged.has_gates(), &manifest)];
     remarks.into_iter().flatten().for_each(|remark| judged.add_remark(remark));

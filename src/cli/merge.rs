@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::controller_watch::{keep_changes, kept_changes};
+use closecall_campaign::folder::{Folder, FolderError};
 use closecall_campaign::merge::Parts;
 use closecall_campaign::rare::RareParts;
 use closecall_campaign::saved::{SavedCampaign, works};
@@ -129,8 +131,12 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     // Rates that an earlier merge has left are none of these parts.
     Fidelity::remove(saved.folder())?;
     let rates = fast_parts.map(|fast| fast.merge(saved.folder(), args.resume, is_trusted)).transpose()?;
+    let changes = args.parts.iter().map(|part| kept_changes(&Folder::open(part)));
+    let changes = changes.collect::<Result<Vec<_>, FolderError>>()?.concat();
+    keep_changes(saved.folder(), &changes)?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let mut judged = tally.judgement();
+    judged.add_invalid(changes);
     if let Some(remark) = known_seed(judged.has_gates(), saved.manifest(), false) {
         judged.add_remark(remark);
     }

@@ -344,8 +344,10 @@ fn a_controller_that_changes_during_the_campaign_makes_it_invalid() {
         fs::write(at("edited"), "").unwrap();
         let mut command = program();
         command.current_dir(place.path());
-        command.args(["campaign", "low-thw-overtake", "-n", "3", "--sensors", "object", "--no-gate", "--out", "out"]);
-        command.args(["--controller", "exec:sh own.sh", "--controller-timeout-ms", "60000", "--record", "failures:0"]);
+        let fixed = ["campaign", "low-thw-overtake", "-n", "3", "--sensors", "object", "--no-gate", "--out", "out"];
+        let more = ["--controller", "exec:sh own.sh", "--controller-timeout-ms", "60000", "--record", "failures:0"];
+        let words = [&fixed[..], &more, &["--partition", "1/1"]].concat();
+        command.args(&words);
         command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
         let child = command.spawn().unwrap();
         let started = Instant::now();
@@ -360,6 +362,15 @@ fn a_controller_that_changes_during_the_campaign_makes_it_invalid() {
         let says = text.contains(&format!("the controller changed during the campaign: {edited}"))
             || text.contains(&format!("/{edited} is not what it was at the start"));
         assert_eq!(says, is_noticed, "{edited}: {text}");
+        // The files are as they were, and the samples are not.
+        fs::write(at("helper.sh"), "true\n").unwrap();
+        fs::write(at("own.sh"), script(&edited.replace("unused", "${un}used"))).unwrap();
+        let resumed = program().current_dir(place.path()).args(&words).arg("--resume").output().unwrap();
+        assert_eq!(code(&resumed), expected, "{edited}: {}", stderr(&resumed));
+        drop(fs::remove_dir_all(at("merged")));
+        let (out, merged) = (at("out"), at("merged"));
+        let words = ["tool", "merge", out.to_str().unwrap(), "--no-gate", "--out", merged.to_str().unwrap()];
+        assert_eq!(code(&closecall(words)), expected, "{edited}");
     }
 }
 
