@@ -35,6 +35,7 @@ use super::CliError;
 use super::actions::command_for;
 use super::output::{during, outln, print_error, print_written};
 use super::page_server::{Answer, Method, PageServer};
+use super::saved::difference_from_journal;
 use super::view_error::ViewError;
 use super::viewer::Viewer;
 
@@ -143,14 +144,19 @@ impl Explorer<'_> {
         make(sample)
     }
 
-    /// Runs a sample again in all arms.
-    fn films(&self, scenario: &str, sample: u64, level: Level) -> Result<Vec<Film>, CliError> {
+    /// Runs a sample again in all arms. Returns the films, and a message if one of them is another
+    /// run than the campaign's.
+    fn films(&self, scenario: &str, sample: u64, level: Level) -> Result<(Vec<Film>, Option<String>), CliError> {
         let (concrete, key) = self.saved.sample(Some(scenario), sample)?;
-        film_arms(&concrete, key, &self.saved.arms()?, level).map_err(|source| CliError::Sample { sample, source })
+        let films = film_arms(&concrete, key, &self.saved.arms()?, level)
+            .map_err(|source| CliError::Sample { sample, source })?;
+        let difference = difference_from_journal(self.saved, films.iter().filter_map(Film::outcome))?;
+        Ok((films, difference))
     }
 
     fn sample(&self, scenario: &str, sample: u64) -> Result<String, CliError> {
-        Ok(sample_part(&self.films(scenario, sample, Level::Objects)?))
+        let (films, difference) = self.films(scenario, sample, Level::Objects)?;
+        Ok(sample_part(&films, difference.as_deref()))
     }
 
     fn twin(&self, scenario: &str, sample: u64) -> Result<String, CliError> {
@@ -174,11 +180,12 @@ impl Explorer<'_> {
     /// Opens a sample in the viewer, and does not wait for it.
     fn open(&self, scenario: &str, sample: u64) -> Result<String, CliError> {
         let viewer = Viewer::find(self.viewer.program).map_err(ViewError::from)?;
-        let films = self.films(scenario, sample, Level::Full)?;
+        let (films, difference) = self.films(scenario, sample, Level::Full)?;
         let path = self.recordings.path().join(format!("{sample}.rrd"));
         write_recording(&path, &films)?;
         viewer.start(&path, self.viewer.is_web, self.viewer.port).map_err(ViewError::from)?;
-        Ok(format!("Sample {sample} is open in the Rerun viewer."))
+        let difference = difference.map_or_else(String::new, |difference| format!(" But {difference}."));
+        Ok(format!("Sample {sample} is open in the Rerun viewer.{difference}"))
     }
 
     /// Returns a page of the recordings.

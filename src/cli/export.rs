@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use closecall_campaign::arguments::whole;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_campaign::saved::SavedCampaign;
 use closecall_report::exchange::{Case, CaseFiles, Form, Motion, write_case};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{RunKey, Scenario, ScenarioFile};
@@ -16,9 +17,9 @@ use super::args::{SensorsChoice, SetArgs};
 use super::arms::ControllerArgs;
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::{print_written, textln};
+use super::output::{print_error, print_written, textln};
 use super::protect::{of_campaign, of_controller, of_scenario, protect};
-use super::saved::TrustArgs;
+use super::saved::{TrustArgs, difference_from_journal};
 use crate::exit_code::ExitCode;
 
 /// The form of a case.
@@ -97,6 +98,8 @@ struct Chosen {
     arm: Arm,
     value_sets: Vec<Parameters>,
     inputs: Vec<PathBuf>,
+    /// The campaign whose run it is; `None` if it is no run of a campaign.
+    campaign: Option<SavedCampaign>,
 }
 
 pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
@@ -108,15 +111,18 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
         [] => Form::OPENSCENARIO.to_vec(),
         forms => forms.iter().map(|form| Form::from(*form)).collect(),
     };
-    let Chosen { file, scenario, key, arm, value_sets, inputs } = &chosen;
+    let Chosen { file, scenario, key, arm, value_sets, inputs, campaign } = &chosen;
     let written = forms.iter().flat_map(|form| form.files()).map(|name| args.output.join(name)).collect::<Vec<_>>();
     let outputs: Vec<_> = written.iter().map(|path| ("--out", Some(path.as_path()))).collect();
     protect(inputs, &outputs)?;
     check_backend_of(scenario, std::slice::from_ref(arm))?;
     let mut motion = Motion::default();
+    let mut difference = None;
     if forms.iter().any(|form| form.needs_run()) {
-        run_guarded(scenario, *key, arm, &mut motion)
+        let outcome = run_guarded(scenario, *key, arm, &mut motion)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
+        let of_campaign = |saved| difference_from_journal(saved, [&outcome]);
+        difference = campaign.as_ref().map(of_campaign).transpose()?.flatten();
     }
     let (controller, motion) = (arm.controller.name(), &motion);
     let files = Case { file, scenario, key: *key, controller, motion, value_sets }.files(&forms);
@@ -127,7 +133,10 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
         textln!("{}: not said in the file:", form.name());
         unsaid.iter().for_each(|statement| textln!("  {statement}"));
     }
-    Ok(ExitCode::Pass)
+    Ok(difference.map_or(ExitCode::Pass, |difference| {
+        print_error(format_args!("{difference}\n"));
+        ExitCode::Invalid
+    }))
 }
 
 /// Returns an error if the folder has a file of an earlier case that would remain: it would be taken
@@ -157,7 +166,7 @@ fn of_file(args: &ExportArgs) -> Result<Chosen, CliError> {
     let arm = super::arms::arm(&args.controller.choice(file.config().function)?, args.sensors);
     let inputs = of_scenario(&file);
     let key = RunKey { seed, sample: args.sample };
-    Ok(Chosen { value_sets: drawn.collect(), scenario, key, arm, inputs, file })
+    Ok(Chosen { value_sets: drawn.collect(), scenario, key, arm, inputs, file, campaign: None })
 }
 
 fn of_folder(args: &ExportArgs) -> Result<Chosen, CliError> {
@@ -181,7 +190,9 @@ fn of_folder(args: &ExportArgs) -> Result<Chosen, CliError> {
     let end = args.sample.saturating_add(args.value_sets).min(count);
     let drawn = (args.sample..end).map(|sample| file.space().sample(sampling.design, key.seed, sample, count));
     let inputs = inputs_of(&args.source, manifest.arms.iter().flat_map(of_controller));
-    Ok(Chosen { value_sets: drawn.collect(), arm: saved.arm(args.arm.as_deref())?, scenario, key, inputs, file })
+    let (value_sets, arm) = (drawn.collect(), saved.arm(args.arm.as_deref())?);
+    let campaign = args.set.settings.is_empty().then_some(saved);
+    Ok(Chosen { value_sets, arm, scenario, key, inputs, file, campaign })
 }
 
 fn inputs_of(folder: &Path, controllers: impl Iterator<Item = PathBuf>) -> Vec<PathBuf> {

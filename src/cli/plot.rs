@@ -16,9 +16,9 @@ use super::args::SetArgs;
 use super::arms::{ArmArgs, ComparisonArgs};
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
-use super::output::{during, print_written, textln};
+use super::output::{during, print_error, print_written, textln};
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
-use super::saved::TrustArgs;
+use super::saved::{TrustArgs, difference_from_journal};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
@@ -61,13 +61,16 @@ pub(super) struct PlotArgs {
 }
 
 pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
-    let films = if args.source.is_dir() { of_campaign(args)? } else { of_scenario(args)? };
+    let (films, difference) = if args.source.is_dir() { of_campaign(args)? } else { (of_scenario(args)?, None) };
     args.output.write(&encounter(&films), args.width_mm)?;
     for film in &films {
         textln!("{}: {}", film.title(), film.headline());
     }
     print_written(args.output.path());
-    Ok(ExitCode::Pass)
+    Ok(difference.map_or(ExitCode::Pass, |difference| {
+        print_error(format_args!("{difference}\n"));
+        ExitCode::Invalid
+    }))
 }
 
 fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
@@ -83,8 +86,9 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     films(&scenario, RunKey { seed, sample }, &args.comparison.arms(&args.arm, &file, &of_arms)?)
 }
 
-/// Films a sample of a campaign as the campaign ran it, in every arm.
-fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
+/// Films a sample of a campaign as the campaign ran it, in every arm. Returns the films, and a message
+/// if one of them is another run than the campaign's.
+fn of_campaign(args: &PlotArgs) -> Result<(Vec<Film>, Option<String>), CliError> {
     if args.seed.is_some() || !args.set.settings.is_empty() {
         return Err(CliError::usage("a campaign has its own seed and settings: --seed and --set cannot change them"));
     }
@@ -112,7 +116,9 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         let sensors = arms.first().and_then(|tested| tested.sensors);
         arms.insert(0, Arm { controller: ControllerChoice::ACC.factory(), sensors });
     }
-    films(&scenario, key, &arms)
+    let films = films(&scenario, key, &arms)?;
+    let difference = difference_from_journal(&saved, films.iter().filter_map(Film::outcome))?;
+    Ok((films, difference))
 }
 
 fn films(scenario: &Scenario, key: RunKey, arms: &[Arm]) -> Result<Vec<Film>, CliError> {

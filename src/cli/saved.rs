@@ -4,8 +4,10 @@ use std::path::Path;
 
 use clap::Args;
 use closecall_campaign::arguments::{MemoryMib, TimeoutMs};
+use closecall_campaign::folder::Agreement;
 use closecall_campaign::rare::RareManifest;
 use closecall_campaign::saved::SavedCampaign;
+use closecall_scenarios::outcome::Outcome;
 use serde::Deserialize;
 
 use super::CliError;
@@ -45,6 +47,24 @@ pub(super) fn refuse_rare(path: &Path) -> Result<(), CliError> {
         SavedCampaign::open(path)?;
     }
     Ok(())
+}
+
+/// Returns a message if one of these runs of a sample is not the run of the campaign, to the last
+/// bit.
+pub(super) fn difference_from_journal<'a>(
+    saved: &SavedCampaign,
+    outcomes: impl IntoIterator<Item = &'a Outcome>,
+) -> Result<Option<String>, CliError> {
+    for outcome in outcomes {
+        if saved.folder().agreement(outcome)? == Agreement::Differs {
+            let (sample, controller) = (outcome.sample, &outcome.controller);
+            return Ok(Some(format!(
+                "sample {sample} with `{controller}` differs from the campaign's journal: the controller, a file that it imports or \
+                 the program has changed, or does not repeat"
+            )));
+        }
+    }
+    Ok(None)
 }
 
 /// The limits of the processes of controllers.

@@ -45,6 +45,16 @@ fn an_edited_controller_is_refused_on_resuming_and_named_by_replay() {
         "{}",
         stderr(&replayed)
     );
+    // What another run draws or writes is not taken for the campaign's.
+    let out = folder.path().join("out");
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for (words, place) in [(&["plot"][..], at("picture.svg")), (&["tool", "export"], at("case"))] {
+        let output = closecall(words.iter().copied().chain([out.to_str().unwrap(), "0", "--out", &place]));
+        assert_eq!(code(&output), 7, "{words:?}: {}", stderr(&output));
+        assert!(message(&output).contains("differs from the campaign's journal"), "{words:?}: {}", stderr(&output));
+    }
+    fs::write(&script, STEADY).unwrap();
+    stdout(&closecall(["plot", out.to_str().unwrap(), "0", "--out", &at("same.svg")]), 0);
 }
 
 #[test]

@@ -7,9 +7,13 @@ use maud::{Markup, html};
 use crate::run::figure::{incident, timeline};
 use crate::run::film::Film;
 
-/// Returns a sample in all arms as a part of a page.
-pub fn sample_part(films: &[Film]) -> String {
+/// Returns a sample in all arms as a part of a page. `difference` says that it is another run than the
+/// campaign's.
+pub fn sample_part(films: &[Film], difference: Option<&str>) -> String {
     finished(&html! {
+        @if let Some(difference) = difference {
+            p.headline { (difference) }
+        }
         p.headline { (Film::verdict_word(films)) }
         div.arms { (incident(films)) }
         (timeline(films))
