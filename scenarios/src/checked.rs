@@ -193,7 +193,8 @@ impl ScenarioConfig {
             let problem = Problem::Contradiction { other: "gate.require", rule };
             return Err(ConfigError::new("require", problem).within("gate"));
         }
-        Range::closed(0.0, 1.0).check(self.expects_share, "expects-share")?;
+        // With a share of 0, what is expected need not happen.
+        Range::above(0.0, 1.0).check(self.expects_share, "expects-share")?;
         if let Some(max) = self.gate.max_probability {
             Range::above(0.0, BELOW_ONE).check(max, "max-probability").map_err(|error| error.within("gate"))?;
         }

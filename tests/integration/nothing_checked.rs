@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::native_controllers::{compile, lib, with_fault};
 use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
 
 /// Options that gate, and options that do not, each with a value that everything meets.
@@ -72,6 +73,44 @@ fn a_campaign_without_gates_and_checks_is_not_judged() {
     assert!(stdout(&run(&["--max-collisions", "4"]), 4).contains("too few samples"));
     let any = stdout(&closecall(["campaign", enough[1], "-n", "20", "--max-collisions", "20"]), 4);
     assert!(any.contains("it holds whatever happens in these samples"), "{any}");
+    for (limit, expected) in [
+        (["--max-flaky", "19"], 0),
+        (["--max-flaky", "20"], 4),
+        (["--max-flip-rate", "0.4"], 0),
+        (["--max-flip-rate", "1"], 4),
+    ] {
+        let text = stdout(&closecall(enough.iter().chain(&limit)), expected);
+        assert_eq!(text.contains("which holds whatever happens"), expected == 4, "{limit:?}: {text}");
+    }
+}
+
+#[test]
+fn a_controller_of_which_no_validity_check_has_a_result_does_not_pass() {
+    let folder = folder();
+    let path = bare(folder.path(), "overtake-without-brake");
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let run = |fault: Option<&str>| {
+        let mut command = program();
+        command
+            .args(["campaign", path.to_str().unwrap(), "-n", "20", "--sensors", "object", "--paired", "--no-out"])
+            .args(["--max-collisions", "4", "--controller-timeout-ms", "300", "--controller", &library]);
+        with_fault(&mut command, fault)
+    };
+    assert!(stdout(&run(None), 0).contains("PASS"));
+    // It does not answer in the mirrored world. The baseline does.
+    let text = stdout(&run(Some("mirror")), 4);
+    assert!(text.contains("INCONCLUSIVE: not checked: 2 of 4 runs") && text.contains(": none of "), "{text}");
+}
+
+#[test]
+fn a_scenario_whose_expectation_no_sample_can_miss_is_refused() {
+    let folder = folder();
+    let path = folder.path().join("any.toml");
+    let text = std::fs::read_to_string(library("overtake-without-brake")).unwrap();
+    std::fs::write(&path, text.replacen("\nexpects = ", "\nexpects-share = 0.0\nexpects = ", 1)).unwrap();
+    let refused = closecall(["check", path.to_str().unwrap()]);
+    assert_eq!(code(&refused), 3, "{}", stderr(&refused));
+    assert!(message(&refused).contains("expects-share"), "{}", stderr(&refused));
 }
 
 #[test]
