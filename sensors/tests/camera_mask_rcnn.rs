@@ -83,6 +83,7 @@ fn a_network_with_another_layout_is_refused_with_both_layouts() {
         "outputs scores",
         "wanted are an input float [3, 800, 1280]",
         "masks float [n, 1, height, width]",
+        "without masks the first three, or one output float [1, n, 6]",
     ] {
         assert!(error.contains(part), "{part}: {error}");
     }
@@ -135,18 +136,45 @@ fn the_layout_of_torchvision_is_read_with_a_batch_and_with_masks_of_the_size_of_
     assert_eq!(instances[0].mask.extent_px(), Some([0.0, 0.0, 1280.0, 800.0]));
 }
 
+#[test]
+fn a_detector_without_masks_is_read_from_three_outputs_or_from_rows() {
+    let Some(backend) = backend() else { return };
+    for file in ["boxes.onnx", "rows.onnx"] {
+        let instances = found_by(file, MaskRcnnInput::Rgb, &backend);
+        assert_found(&instances, [0.2, 0.4, 0.8]);
+        for Instance { box_px, mask, .. } in &instances {
+            assert_eq!(mask.extent_px(), Some(*box_px), "{file}: the box takes the place of the mask");
+        }
+        let inside = instances[1].mask.pixels().iter().filter(|inside| **inside).count();
+        assert_eq!(inside, 100 * 100, "{file}");
+    }
+}
+
+#[test]
+fn an_image_without_a_vehicle_has_no_instance() {
+    let Some(backend) = backend() else { return };
+    // The scores are the first pixel: a score of 0 is an empty row.
+    let bytes = include_bytes!("mask_rcnn_layouts/rows.onnx");
+    let labels = LabelMap::parse("3=car").unwrap();
+    let mut detector = InstanceDetector::new(bytes, Some(&labels), &backend).unwrap();
+    assert_eq!(detector.detect(&black()).unwrap(), []);
+}
+
+fn black() -> Image {
+    let [width, height] = [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
+    Image { width: width as u32, height: height as u32, rgb: vec![0; width * height * 3] }
+}
+
 /// Returns the error of a network whose file is `bytes`, with these values for the colours of a
 /// pixel.
 fn error_of(bytes: &[u8], input: MaskRcnnInput, backend: &Backend) -> String {
     let labels = LabelMap::parse("3=car 8=truck 4=motorcycle").unwrap();
     let detector = InstanceDetector::new(bytes, Some(&labels), backend).unwrap();
-    let mut detector = detector.with_input(input).with_name("own.onnx");
-    let [width, height] = [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
-    let picture = Image { width: width as u32, height: height as u32, rgb: vec![0; width * height * 3] };
-    detector.detect(&picture).unwrap_err().to_string()
+    detector.with_input(input).with_name("own.onnx").detect(&black()).unwrap_err().to_string()
 }
 
-/// Returns the bytes of a file with the first occurrence of a number replaced by another number.
+/// Returns the bytes of a file with the first occurrence of a number replaced by another number. The
+/// files hold the boxes `[600, 400, 640, 440]`, `[700, 380, 800, 480]` and `[500, 400, 520, 440]`.
 fn replaced(bytes: &[u8], from: f32, to: f32) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let place = bytes.windows(4).position(|window| window == from.to_le_bytes()).expect("the number");
@@ -173,6 +201,48 @@ fn an_answer_that_is_no_box_or_no_probability_is_an_error_that_names_network_and
     // A network that takes shares of full brightness, and gets bytes less their means.
     let error = error_of(torchvision, MaskRcnnInput::BgrMean, &backend);
     assert!(error.contains("own.onnx") && error.contains("`scores`"), "{error}");
+}
+
+#[test]
+fn a_wrong_answer_of_a_detector_without_masks_is_an_error_that_names_its_place() {
+    let Some(backend) = backend() else { return };
+    let boxes = include_bytes!("mask_rcnn_layouts/boxes.onnx");
+    let rows = include_bytes!("mask_rcnn_layouts/rows.onnx");
+    let rgb = |bytes: &[u8]| error_of(bytes, MaskRcnnInput::Rgb, &backend);
+    // No number, a box that ends before it begins, and boxes beyond each side of the image.
+    for (from, to) in [(700.0, f32::NAN), (800.0, f32::INFINITY), (700.0, 900.0), (800.0, -1.0), (480.0, 379.0)] {
+        let error = rgb(&replaced(boxes, from, to));
+        assert!(error.contains("own.onnx") && error.contains("`boxes`") && error.contains("in the image"), "{error}");
+        let error = rgb(&replaced(rows, from, to));
+        assert!(error.contains("own.onnx") && error.contains("`output0`") && error.contains("in the image"), "{error}");
+    }
+    let beyond = replaced(&replaced(rows, 700.0, 1300.0), 800.0, 1400.0);
+    assert!(rgb(&beyond).contains("in the image"), "{}", rgb(&beyond));
+    // The third value of the second row.
+    let error = rgb(&replaced(rows, 800.0, f32::NAN));
+    assert!(error.contains("NaN as value 8"), "{error}");
+    // 8 is the label of the second row.
+    let error = rgb(&replaced(rows, 8.0, 7.5));
+    assert!(error.contains("7.5 as value 11") && error.contains("whole labels"), "{error}");
+    for file in [&boxes[..], rows] {
+        let error = error_of(file, MaskRcnnInput::BgrMean, &backend);
+        assert!(error.contains("own.onnx") && error.contains("probabilities from 0 to 1"), "{error}");
+    }
+}
+
+#[test]
+fn boxes_in_shares_of_the_image_are_refused() {
+    let Some(backend) = backend() else { return };
+    let mut bytes = include_bytes!("mask_rcnn_layouts/boxes.onnx").to_vec();
+    for side_px in [600.0, 400.0, 640.0, 440.0, 700.0, 380.0, 800.0, 480.0, 500.0, 400.0, 520.0, 440.0] {
+        bytes = replaced(&bytes, side_px, side_px / f32::from(WIDTH_PX));
+    }
+    let labels = LabelMap::parse("3=car").unwrap();
+    let mut detector = InstanceDetector::new(&bytes, Some(&labels), &backend).unwrap();
+    let mut picture = black();
+    picture.rgb[..3].copy_from_slice(&FIRST_PIXEL);
+    let error = detector.detect(&picture).unwrap_err().to_string();
+    assert!(error.contains("`boxes`") && error.contains("not in shares of it"), "{error}");
 }
 
 #[test]

@@ -1,12 +1,19 @@
-//! An instance segmentation network that reads the image and returns boxes, labels, scores and
-//! masks, as the Mask R-CNNs of torchvision and of the ONNX model zoo do. It runs in ONNX Runtime:
-//! tract has no `RoiAlign`.
+//! A network that reads the image and returns boxes, labels, scores and masks, as the Mask R-CNNs of
+//! torchvision and of the ONNX model zoo do, or boxes, labels and scores alone. It runs in ONNX
+//! Runtime: tract has no `RoiAlign`.
 //!
 //! ```text
 //!   image   float [3, 800, 1280] or [1, 3, 800, 1280], as `MaskRcnnInput` says
 //!     ▼
 //!   boxes   float [n, 4]: left, top, right, bottom (px)      labels  int64 [n]
 //!   scores  float [n]: 0 to 1                                masks   float [n, 1, height, width], 0 to 1
+//! ```
+//!
+//! A detector without masks has the other three outputs, or all of them in one, as YOLO has after
+//! non-maximum suppression. The box then takes the place of the mask.
+//!
+//! ```text
+//!   rows    float [1, n, 6]: left, top, right, bottom (px), score, label; a row with the score 0 is empty
 //! ```
 //!
 //! A mask has either the size of the image or divides its box. The metadata of a model may name the
@@ -33,16 +40,32 @@ pub const SHIPPED_MASK_RCNN: &[u8] = include_bytes!("../../models/rear-mask-rcnn
 
 /// The layout that a network must have.
 const WANTED: &str = "an input float [3, 800, 1280] or [1, 3, 800, 1280] (sides may be dynamic), and the outputs boxes float \
-                      [n, 4], labels int64 [n], scores float [n], masks float [n, 1, height, width]";
+                      [n, 4], labels int64 [n], scores float [n], masks float [n, 1, height, width]; without masks the first three, \
+                      or one output float [1, n, 6] of boxes, scores and labels after non-maximum suppression";
 /// Rows and columns of the image.
 const IMAGE: [usize; 2] = [HEIGHT_PX as usize, WIDTH_PX as usize];
 
 /// Name of the file of [`SHIPPED_MASK_RCNN`].
 const SHIPPED_FILE: &str = "rear-mask-rcnn.onnx";
+/// Allowed boxes.
+const SIDES: &str = "finite sides in the image: left, top, right beyond left, and bottom beyond top (px)";
+/// Boxes of a network that does not return pixels.
+const SHARES: &str = "sides in pixels of the image, not in shares of it,";
+/// Number of values of a box, a score and a label in one row.
+const ROW: usize = 6;
 /// Allowed scores and masks.
 const PROBABILITIES: &str = "probabilities from 0 to 1";
 /// Difference by which a probability in single precision may be outside of 0 to 1.
 const ROUNDING: f32 = 1e-4;
+
+/// The names of the outputs.
+#[derive(Debug)]
+enum Outputs {
+    /// Boxes, labels and scores, and the masks if the network makes any.
+    Apart { boxes: String, labels: String, scores: String, masks: Option<String> },
+    /// Boxes, scores and labels in one tensor.
+    Rows(String),
+}
 
 /// A network, loaded into one inference session.
 #[derive(Debug)]
@@ -50,8 +73,7 @@ pub struct InstanceDetector {
     session: Session,
     /// Name and rank of the input.
     input: (String, usize),
-    /// Names of boxes, labels, scores and masks.
-    outputs: [String; 4],
+    outputs: Outputs,
     sampling: Sampling,
     labels: LabelMap,
     /// Name of the network in errors.
@@ -170,53 +192,132 @@ impl InstanceDetector {
 /// Returns the instances of the network's outputs.
 fn instances(
     outputs: &SessionOutputs<'_>,
-    names: &[String; 4],
+    names: &Outputs,
     map: &LabelMap,
     model: &str,
 ) -> Result<Vec<Instance>, ClassifierError> {
-    let [boxes, labels, scores, masks] = names;
     let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
-    let (boxes_shape, boxes) = outputs[boxes.as_str()].try_extract_tensor::<f32>().map_err(run)?;
-    let (labels_shape, labels) = outputs[labels.as_str()].try_extract_tensor::<i64>().map_err(run)?;
-    let (scores_shape, scores) = outputs[scores.as_str()].try_extract_tensor::<f32>().map_err(run)?;
-    let (masks_shape, masks) = outputs[masks.as_str()].try_extract_tensor::<f32>().map_err(run)?;
-    let side = |index: usize| masks_shape.get(index).map_or(0, |side| usize::try_from(*side).unwrap_or(0));
-    let (rows, columns, count) = (side(2), side(3), scores.len());
-    let is_right = boxes.len() == 4 * count && labels.len() == count && masks.len() == count * rows * columns;
-    if !is_right || (count > 0 && rows * columns == 0) {
-        let actual =
-            format!("boxes {boxes_shape:?}, labels {labels_shape:?}, scores {scores_shape:?}, masks {masks_shape:?}");
-        return Err(ClassifierError::Layout { actual, wanted: WANTED });
+    let floats = |name: &str| outputs[name].try_extract_tensor::<f32>().map_err(run);
+    let wrong_layout = |actual| Err(ClassifierError::Layout { actual, wanted: WANTED });
+    match names {
+        Outputs::Rows(name) => {
+            let (shape, values) = floats(name)?;
+            if !values.len().is_multiple_of(ROW) || shape.last() != Some(&(ROW as i64)) {
+                return wrong_layout(format!("{name} {shape:?}"));
+            }
+            let part = |range: std::ops::Range<usize>| -> Vec<f32> {
+                values.chunks_exact(ROW).flat_map(|row| row[range.clone()].to_vec()).collect()
+            };
+            let (boxes, scores, labels) = (part(0..4), part(4..5), part(5..6));
+            let is_no_label = |label: &f32| label.fract() != 0.0;
+            let tensor = |values, place| Tensor { name, values, place };
+            tensor(&labels, |row| ROW * row + 5).refuse(labels.iter().position(is_no_label), "whole labels", model)?;
+            #[expect(clippy::cast_possible_truncation, reason = "whole, and one that is out of range has no class")]
+            let labels: Vec<i64> = labels.iter().map(|label| *label as i64).collect();
+            let boxes = tensor(&boxes, |side| side / 4 * ROW + side % 4);
+            let scores = tensor(&scores, |row| ROW * row + 4);
+            Answer { boxes, labels: &labels, scores, masks: None }.instances(map, model)
+        }
+        Outputs::Apart { boxes, labels, scores, masks } => {
+            let ((boxes_shape, box_sides), (scores_shape, score_values)) = (floats(boxes)?, floats(scores)?);
+            let (labels_shape, label_values) = outputs[labels.as_str()].try_extract_tensor::<i64>().map_err(run)?;
+            let masks =
+                masks.as_ref().map(|name| floats(name).map(|(shape, values)| (name, shape, values))).transpose()?;
+            let count = score_values.len();
+            let side = |shape: &[i64], index: usize| shape.get(index).and_then(|side| usize::try_from(*side).ok());
+            let cells = masks.as_ref().map(|(_, shape, _)| [3, 2].map(|index| side(shape, index).unwrap_or(0)));
+            let are_masks_right = masks.as_ref().zip(cells).is_none_or(|((_, _, values), [columns, rows])| {
+                values.len() == count * rows * columns && (count == 0 || rows * columns > 0)
+            });
+            if box_sides.len() != 4 * count || label_values.len() != count || !are_masks_right {
+                let of_masks = masks.map_or_else(String::new, |(_, shape, _)| format!(", masks {shape:?}"));
+                return wrong_layout(format!(
+                    "boxes {boxes_shape:?}, labels {labels_shape:?}, scores {scores_shape:?}{of_masks}"
+                ));
+            }
+            let tensor = |name, values| Tensor { name, values, place: |index| index };
+            let masks = masks.zip(cells).map(|((name, _, values), cells)| (tensor(name, values), cells));
+            let (boxes, scores) = (tensor(boxes, box_sides), tensor(scores, score_values));
+            Answer { boxes, labels: label_values, scores, masks }.instances(map, model)
+        }
     }
-    let check = |tensor: &String, place: Option<usize>, values: &[f32], allowed: &'static str| {
-        let Some(index) = place else { return Ok(()) };
-        let value = format!("{} as value {index}", values[index]);
-        Err(ClassifierError::Value { model: model.to_owned(), tensor: tensor.clone(), value, allowed })
-    };
-    let is_no_box =
-        |sides: &[f32]| sides.iter().any(|side| !side.is_finite()) || sides[2] < sides[0] || sides[3] < sides[1];
-    let wrong_side = |sides: &[f32]| sides.iter().position(|side| !side.is_finite()).unwrap_or(2);
-    let wrong_box = boxes.chunks_exact(4).enumerate().find(|(_, sides)| is_no_box(sides));
-    let wrong_box = wrong_box.map(|(index, sides)| 4 * index + wrong_side(sides));
-    check(&names[0], wrong_box, boxes, "finite sides: left, top, right beyond left, and bottom beyond top (px)")?;
-    let is_no_probability = |value: &f32| !(-ROUNDING..=1.0 + ROUNDING).contains(value);
-    check(&names[2], scores.iter().position(is_no_probability), scores, PROBABILITIES)?;
-    check(&names[3], masks.iter().position(is_no_probability), masks, PROBABILITIES)?;
-    let is_image = [columns, rows] == [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
-    let instances = (0..count).filter_map(|index| {
-        let box_px: [f64; 4] = std::array::from_fn(|part| f64::from(boxes[4 * index + part]));
-        let class = map.class(labels[index])?;
-        let area_px = if is_image { [0.0, 0.0, WIDTH_PX.into(), HEIGHT_PX.into()] } else { box_px };
-        let mask = Mask::new(area_px, [columns, rows], masks[index * rows * columns..][..rows * columns].to_vec())?;
-        Some(Instance { box_px, class, score: f64::from(scores[index]).clamp(0.0, 1.0), mask })
-    });
-    Ok(instances.collect())
 }
 
-/// Returns name and rank of the input, and the names of boxes, labels, scores and masks.
+/// Values of one kind in an output.
+struct Tensor<'a> {
+    /// Name of the output.
+    name: &'a str,
+    values: &'a [f32],
+    /// Returns the place in the output of the value with this index.
+    place: fn(usize) -> usize,
+}
+
+impl Tensor<'_> {
+    /// Refuses the value with this index, if there is one.
+    fn refuse(&self, index: Option<usize>, allowed: &'static str, model: &str) -> Result<(), ClassifierError> {
+        let Some(index) = index else { return Ok(()) };
+        let value = format!("{} as value {}", self.values[index], (self.place)(index));
+        Err(ClassifierError::Value { model: model.to_owned(), tensor: self.name.to_owned(), value, allowed })
+    }
+}
+
+/// What the network returned for an image: as many boxes, labels and scores.
+struct Answer<'a> {
+    boxes: Tensor<'a>,
+    labels: &'a [i64],
+    scores: Tensor<'a>,
+    /// The masks, each with so many columns and rows, if the network makes any.
+    masks: Option<(Tensor<'a>, [usize; 2])>,
+}
+
+impl Answer<'_> {
+    /// Returns the instances whose labels are classes of vehicles. A score of 0 is none: exports of
+    /// YOLO fill up their rows with zeros.
+    fn instances(&self, map: &LabelMap, model: &str) -> Result<Vec<Instance>, ClassifierError> {
+        let (boxes, scores) = (self.boxes.values, self.scores.values);
+        let [width_px, height_px] = [WIDTH_PX, HEIGHT_PX].map(f32::from);
+        let is_box = |sides: &[f32]| {
+            sides.iter().all(|side| side.is_finite())
+                && sides[0] <= sides[2].min(width_px)
+                && sides[1] <= sides[3].min(height_px)
+                && sides[2] >= 0.0
+                && sides[3] >= 0.0
+        };
+        let wrong_side = |sides: &[f32]| sides.iter().position(|side| !side.is_finite()).unwrap_or(2);
+        let wrong_box = boxes.chunks_exact(4).enumerate().find(|(_, sides)| !is_box(sides));
+        let wrong_box = wrong_box.map(|(index, sides)| 4 * index + wrong_side(sides));
+        self.boxes.refuse(wrong_box, SIDES, model)?;
+        let found = || (0..scores.len()).filter(|index| scores[*index] != 0.0);
+        // No camera shows all vehicles within the first pixel.
+        let are_shares = found().all(|index| boxes[4 * index..][..4].iter().all(|side| *side <= 1.0));
+        self.boxes.refuse(found().next().filter(|_| are_shares).map(|index| 4 * index + 2), SHARES, model)?;
+        let is_no_probability = |value: &f32| !(-ROUNDING..=1.0 + ROUNDING).contains(value);
+        self.scores.refuse(scores.iter().position(is_no_probability), PROBABILITIES, model)?;
+        if let Some((masks, _)) = &self.masks {
+            masks.refuse(masks.values.iter().position(is_no_probability), PROBABILITIES, model)?;
+        }
+        let instances = found().filter_map(|index| {
+            let box_px: [f64; 4] = std::array::from_fn(|part| f64::from(boxes[4 * index + part]));
+            let class = map.class(self.labels[index])?;
+            let mask = match &self.masks {
+                None => Mask::new(box_px, [1, 1], vec![1.0])?,
+                Some((masks, [columns, rows])) => {
+                    let is_image = [*columns, *rows] == [usize::from(WIDTH_PX), usize::from(HEIGHT_PX)];
+                    let area_px = if is_image { [0.0, 0.0, WIDTH_PX.into(), HEIGHT_PX.into()] } else { box_px };
+                    let cells = masks.values[index * rows * columns..][..rows * columns].to_vec();
+                    Mask::new(area_px, [*columns, *rows], cells)?
+                }
+            };
+            Some(Instance { box_px, class, score: f64::from(scores[index]).clamp(0.0, 1.0), mask })
+        });
+        Ok(instances.collect())
+    }
+}
+
+/// Returns name and rank of the input, and the names of the outputs.
 ///
-/// The outputs are told apart by their names or, if these are others, by their order.
-fn layout(session: &Session) -> Result<((String, usize), [String; 4]), ClassifierError> {
+/// The outputs are told apart by their names or, if these are others, by their number and order.
+fn layout(session: &Session) -> Result<((String, usize), Outputs), ClassifierError> {
     let (inputs, outputs) = (session.inputs(), session.outputs());
     let wrong = || {
         let list = |outlets: &[Outlet]| {
@@ -235,20 +336,29 @@ fn layout(session: &Session) -> Result<((String, usize), [String; 4]), Classifie
         Some(shape) if fits(&shape, &sides[1..]) || fits(&shape, &sides) => shape.len(),
         _ => return Err(wrong()),
     };
-    let names = ["boxes", "labels", "scores", "masks"];
-    let by_name = names.map(|name| outputs.iter().find(|output| output.name() == name));
-    let by_place = [0, 1, 2, 3].map(|place| outputs.get(place).filter(|_| outputs.len() == 4));
-    let chosen = if by_name.iter().all(Option::is_some) { by_name } else { by_place };
-    let [Some(boxes), Some(labels), Some(scores), Some(masks)] = chosen else { return Err(wrong()) };
+    let input = (input.name().to_owned(), rank);
     let has = |outlet, kind, sides: &[i64]| shape(outlet, kind).is_some_and(|shape| fits(&shape, sides));
+    if let [rows] = outputs {
+        let is_right = has(rows, TensorElementType::Float32, &[1, -1, ROW as i64]);
+        return if is_right { Ok((input, Outputs::Rows(rows.name().to_owned()))) } else { Err(wrong()) };
+    }
+    let named = |name: &str| outputs.iter().find(|output| output.name() == name);
+    let (boxes, labels, scores, masks) = match (named("boxes"), named("labels"), named("scores"), outputs) {
+        (Some(boxes), Some(labels), Some(scores), _) => (boxes, labels, scores, named("masks")),
+        (_, _, _, [boxes, labels, scores]) => (boxes, labels, scores, None),
+        (_, _, _, [boxes, labels, scores, masks]) => (boxes, labels, scores, Some(masks)),
+        _ => return Err(wrong()),
+    };
     let is_right = has(boxes, TensorElementType::Float32, &[-1, 4])
         && has(labels, TensorElementType::Int64, &[-1])
         && has(scores, TensorElementType::Float32, &[-1])
-        && has(masks, TensorElementType::Float32, &[-1, 1, -1, -1]);
+        && masks.is_none_or(|masks| has(masks, TensorElementType::Float32, &[-1, 1, -1, -1]));
     if !is_right {
         return Err(wrong());
     }
-    Ok(((input.name().to_owned(), rank), [boxes, labels, scores, masks].map(|outlet| outlet.name().to_owned())))
+    let name = |outlet: &Outlet| outlet.name().to_owned();
+    let masks = masks.map(name);
+    Ok((input, Outputs::Apart { boxes: name(boxes), labels: name(labels), scores: name(scores), masks }))
 }
 
 /// Returns the shape of a tensor of this kind of element, with −1 for a dynamic side. Returns

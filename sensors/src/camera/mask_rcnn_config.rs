@@ -58,8 +58,8 @@ pub struct MaskRcnnConfig {
     /// Time from the exposure to the result (s), rounded up to the next scan of the LiDAR. The
     /// result applies to the objects that were there at the exposure.
     pub latency_s: Num,
-    /// ONNX file of another network, relative to the working directory. Default: none; the one that
-    /// ships with Closecall.
+    /// ONNX file of another network, relative to the working directory: a Mask R-CNN, or a detector
+    /// without masks. Default: none; the one that ships with Closecall.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
     /// Labels of the other network, such as `3=car 4=motorcycle 8=truck`. Default: none; the labels
