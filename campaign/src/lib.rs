@@ -47,6 +47,7 @@ pub mod interrupt;
 pub mod journal;
 mod journal_plan;
 pub mod ledger;
+pub mod left_out;
 pub mod lock;
 pub mod manifest;
 pub mod margins;

@@ -18,6 +18,7 @@ use serde_json::Value;
 
 use super::fingerprint::{self, Fingerprint};
 use super::ledger::Inference;
+use super::left_out::LeftOut;
 use super::partition::Partition;
 use super::sampling::Sampling;
 use super::validity::CheckPlan;
@@ -179,6 +180,9 @@ pub struct Manifest {
     /// nothing in the scenario.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without_effect: Vec<(String, String)>,
+    /// Scenarios that were not run, because a fault of them cannot act with the sensors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
     /// True if the seed was drawn when the campaign began, so that nobody knew it before. A seed
     /// that was named stays named, however the campaign is resumed.
     #[serde(default)]
@@ -454,6 +458,7 @@ mod tests {
             working_folder: None,
             retry_crashed: 0,
             without_effect: Vec::new(),
+            left_out: Vec::new(),
             has_drawn_seed: false,
             replaceable: false,
             command: vec!["closecall".to_owned()],

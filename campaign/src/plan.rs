@@ -22,6 +22,7 @@ use crate::execution::Campaign;
 use crate::fingerprint::Fingerprint;
 use crate::folder::FolderError;
 use crate::ledger::Inference;
+use crate::left_out::LeftOut;
 use crate::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario, file_hash, version};
 use crate::partition::Partition;
 use crate::runner::Work;
@@ -53,6 +54,8 @@ pub struct Plan {
     /// Scenarios and members of a driver ensemble that are not run, because the member changes
     /// nothing in the scenario.
     pub without_effect: Vec<(String, String)>,
+    /// Scenarios that do not run, because a fault of them cannot act with the sensors.
+    pub left_out: Vec<LeftOut>,
     /// Whether the seed was drawn when the campaign began, so that nobody knew it before.
     pub has_drawn_seed: bool,
 }
@@ -123,6 +126,7 @@ impl Plan {
             workers: Workers::default(),
             retry_crashed: 0,
             without_effect: Vec::new(),
+            left_out: Vec::new(),
             has_drawn_seed: false,
         })
     }
@@ -290,6 +294,7 @@ impl Plan {
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
             retry_crashed: self.retry_crashed,
             without_effect: self.without_effect.clone(),
+            left_out: self.left_out.clone(),
             has_drawn_seed: self.has_drawn_seed,
             replaceable: false,
             command,

@@ -6,7 +6,7 @@
 //! | a validity check failed, or what a scenario expects did not happen | [`Decision::Invalid`] | INVALID | 7 |
 //! | a gate or the check of a requirement is not met, or more samples are flaky than allowed | [`Decision::Fail`] | FAIL | 1 |
 //! | the samples do not decide a gate | [`Decision::Inconclusive`] | INCONCLUSIVE | 4 |
-//! | no gate and no requirement was checked, in some scenario none on the system under test, or that system was not there to be tested | [`Decision::NotJudged`] | NOT JUDGED | 4 |
+//! | no gate and no requirement was checked, in some scenario none on the system under test, or that system was not there to be tested, or a scenario was left out | [`Decision::NotJudged`] | NOT JUDGED | 4 |
 //! | a setting, a gate or the baseline weakened what a file demands | [`Decision::Overridden`] | OVERRIDDEN | 4 |
 //! | every gate that was checked is met | [`Decision::Pass`] | PASS | 0 |
 //! | the campaign is a measurement (`--no-gate`) | [`Decision::Measured`] | none | 0 |
@@ -25,6 +25,7 @@ use super::coverage::CoverageResult;
 use super::gate::MAX_FLIP_RATE;
 use super::gate::{ExpectationResult, GateResult, GateSet, GateSource, Judge, RequirementResult, Standing};
 use super::ledger::ArmCounts;
+use super::left_out::{LeftOut, sentences};
 use super::probability::{Answer, Finding};
 use super::summary::{Counts, Summary};
 use super::validity::{CheckCounts, Invariance, RunOfScenario};
@@ -47,7 +48,7 @@ pub enum Verdict {
     #[serde(rename = "INCONCLUSIVE")]
     Inconclusive,
     /// No gate and no requirement was checked, or in some scenario none on the system under test,
-    /// or that system was not available or never acted.
+    /// or that system was not available or never acted, or a scenario did not run.
     #[serde(rename = "NOT JUDGED")]
     NotJudged,
     /// A setting, a gate or the baseline of the command line weakened the criteria of a file.
@@ -171,6 +172,16 @@ impl Judgement {
             self.decision = Decision::Invalid;
             // The first reason is the sentence of the verdict.
             self.reasons.splice(0..0, reasons);
+        }
+    }
+
+    /// Adds the scenarios that did not run. A campaign without one of its scenarios does not pass.
+    pub fn add_left_out(&mut self, left_out: &[LeftOut]) {
+        if !left_out.is_empty() && matches!(self.decision, Decision::Pass | Decision::Overridden) {
+            self.decision = Decision::NotJudged;
+            self.reasons.splice(0..0, sentences(left_out));
+        } else {
+            self.reasons.extend(sentences(left_out));
         }
     }
 

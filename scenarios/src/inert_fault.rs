@@ -7,7 +7,7 @@ use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::suggest::hint;
 use closecall_traffic::{ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road};
 
-use super::inert_object_fault::{refuse_of_map, refuse_of_objects, refuse_of_radars};
+use super::inert_object_fault::{refuse_of_map, refuse_of_map_in, refuse_of_objects, refuse_of_radars};
 use super::intervention::FaultConfig;
 
 /// Why a fault of a camera whose images nothing gets is refused.
@@ -59,7 +59,7 @@ pub(super) fn refuse(
     refuse_of_objects(fault, sensors, parameters)?;
     refuse_of_radars(fault, sensors, parameters)?;
     match &fault.odometry {
-        Some(odometry) => refuse_of_map(odometry, sensors, road, duration_s, parameters),
+        Some(odometry) => refuse_of_map(odometry, road, duration_s, parameters),
         None => Ok(()),
     }
 }
@@ -208,7 +208,7 @@ pub(super) fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<()
     ];
     match absent.into_iter().find(|(is_absent, ..)| *is_absent) {
         Some((_, key, other, rule)) => Err(contradiction(key, other, rule).within("fault")),
-        None => Ok(()),
+        None => fault.odometry.as_ref().map_or(Ok(()), |odometry| refuse_of_map_in(mode, odometry)),
     }
 }
 
@@ -245,6 +245,7 @@ mod tests {
             ("camera-dead", SensorMode::Object, "fault.rear-camera"),
             ("object-late", SensorMode::Full, "fault.rear-object"),
             ("front-radar-dead", SensorMode::GroundTruth, "fault.front-radar"),
+            ("odometry-heading", SensorMode::GroundTruth, "fault.odometry.heading-deg"),
         ] {
             let message = in_mode(name, mode).unwrap_err();
             assert!(message.contains(&format!("`{key}` contradicts `sensors.mode`")), "{message}");
@@ -253,6 +254,7 @@ mod tests {
         in_mode("lidar-dirty", SensorMode::Full).unwrap();
         in_mode("front-radar-dead", SensorMode::Full).unwrap();
         in_mode("odometry-wrong", SensorMode::Full).unwrap();
+        in_mode("odometry-speed", SensorMode::GroundTruth).unwrap();
         in_mode("low-thw-overtake", SensorMode::GroundTruth).unwrap();
     }
 

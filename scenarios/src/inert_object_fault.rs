@@ -54,11 +54,25 @@ pub(super) fn refuse_of_radars(
     Ok(())
 }
 
-/// Refuses errors of the map that begin after the end of the run, that no sensor could show, or
-/// that make a road which the models do not cover, and missing guard rails on a road without any.
+/// Refuses errors of the map that no sensor could show.
+pub(super) fn refuse_of_map_in(mode: SensorMode, odometry: &OdometryErrorConfig) -> Result<(), ConfigError> {
+    let key = match (&odometry.heading_deg, &odometry.curvature_per_m, odometry.rails_missing) {
+        (Some(_), ..) => "heading-deg",
+        (None, Some(_), _) => "curvature-per-m",
+        (None, None, true) => "rails-missing",
+        (None, None, false) => return Ok(()),
+    };
+    let rule = "mode `ground-truth` has no sensor whose measurements are put on a map";
+    match mode {
+        SensorMode::GroundTruth => Err(contradiction(key, "sensors.mode", rule).within("odometry").within("fault")),
+        SensorMode::Object | SensorMode::Full => Ok(()),
+    }
+}
+
+/// Refuses errors of the map that begin after the end of the run, or that make a road which the
+/// models do not cover, and missing guard rails on a road without any.
 pub(super) fn refuse_of_map(
     odometry: &OdometryErrorConfig,
-    sensors: &Sensors,
     road: &Road,
     duration_s: f64,
     parameters: &Parameters,
@@ -68,16 +82,6 @@ pub(super) fn refuse_of_map(
         |num: &Option<Num>, key| parameters.number_or(num.as_ref(), key, Range::closed(f64::MIN, f64::MAX), 0.0);
     if value(&odometry.from_s, "from-s").map_err(located)? >= duration_s {
         return Err(located(contradiction("from-s", "duration-s", "a fault begins before the run ends")));
-    }
-    let is_of_sensors = odometry.heading_deg.is_some() || odometry.curvature_per_m.is_some() || odometry.rails_missing;
-    if is_of_sensors && sensors.mode() == SensorMode::GroundTruth {
-        let key = match (&odometry.heading_deg, &odometry.curvature_per_m) {
-            (Some(_), _) => "heading-deg",
-            (None, Some(_)) => "curvature-per-m",
-            (None, None) => "rails-missing",
-        };
-        let rule = "mode `ground-truth` has no sensor whose measurements are put on a map";
-        return Err(located(contradiction(key, "sensors.mode", rule)));
     }
     if odometry.rails_missing && !road.has_guard_rails() {
         let error =

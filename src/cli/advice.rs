@@ -14,11 +14,14 @@ use closecall_campaign::saved::SavedError;
 use closecall_campaign::session;
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_report::campaign::ReportError;
+use closecall_scenarios::ScenarioError;
+use closecall_scenarios::openscenario::ImportFailure;
 use closecall_sensors::camera::ClassifierError;
 use closecall_simulation::controller::ArmsError;
 use closecall_studies::CausesError;
 use closecall_studies::exposure::Missing;
 use closecall_studies::map::MapError;
+use closecall_traffic::Problem;
 use miette::Diagnostic;
 
 use super::CliError;
@@ -39,6 +42,14 @@ impl Diagnostic for CliError {
 fn advice(error: &CliError) -> Option<&'static str> {
     match error {
         CliError::Results(_) | CliError::ResultsCut(_) => Some(OTHER_FOLDER),
+        CliError::Scenario(ScenarioError::Value { source, .. })
+            if matches!(source.problem, Problem::Contradiction { other: "sensors.mode", .. }) =>
+        {
+            Some(
+                "--set sensors.mode=MODE changes the mode of the scenario, and --sensors MODE runs it in another one: its faults \
+                 must be able to act in both",
+            )
+        }
         CliError::Folder(error) => of_folder(error),
         CliError::Campaign(error) | CliError::Merge(MergeError::Campaign(error)) => of_campaign(error),
         CliError::Merge(MergeError::NotAPart { .. }) => Some("`closecall campaign … --partition K/N` runs a part"),

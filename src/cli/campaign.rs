@@ -14,6 +14,7 @@ use closecall_campaign::end_rule::{EndMonitor, EndedEarly};
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
 use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::{GateSet, Judge};
+use closecall_campaign::left_out::{leave_out, sentences};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::{Plan, check_mis};
@@ -526,7 +527,10 @@ pub(super) fn run_campaign(args: &CampaignArgs, tell: &mut dyn FnMut(&Conclusion
     let is_paired = controllers.len() > 1;
     let mut gates = args.gates.gates(is_paired, args.design.plain(), args.plan.preset_gates(is_paired))?;
     gates.max_flaky = gates.max_flaky.or(args.plan.preset_max_flaky());
-    let plan = args.plan(files, controllers)?;
+    let (files, left_out) = leave_out(files, args.sensors.map(SensorsChoice::mode))?;
+    sentences(&left_out).iter().for_each(|sentence| print_error(format_args!("{sentence}\n")));
+    let mut plan = args.plan(files, controllers)?;
+    plan.left_out = left_out;
     let planned = Planned {
         plan: &plan,
         gates: &gates,
@@ -689,6 +693,7 @@ pub(super) fn carry_out(
     }
     let tally = &progress.tally;
     let mut judged = tally.judgement();
+    judged.add_left_out(&manifest.left_out);
     judged.add_invalid(watch.finish()?);
     let remarks =
         [known_seed(judged.has_gates(), &manifest, planned.can_draw_seed), part_only(judged.has_gates(), &manifest)];

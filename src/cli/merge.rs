@@ -137,6 +137,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let tally = Tally::of(&saved, &works, &gates)?;
     let mut judged = tally.judgement();
     judged.add_invalid(changes);
+    judged.add_left_out(&saved.manifest().left_out);
     if let Some(remark) = known_seed(judged.has_gates(), saved.manifest(), false) {
         judged.add_remark(remark);
     }

@@ -133,6 +133,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         working_folder: None,
         retry_crashed: 0,
         without_effect: Vec::new(),
+        left_out: Vec::new(),
         has_drawn_seed: false,
         replaceable: false,
         command: Vec::new(),

@@ -7,7 +7,7 @@ use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig, Provenance};
 
 use crate::support::{
-    all_of_library, closecall, families_of_library, folder, headline_with, json, library, message, stdout,
+    all_of_library, closecall, code, families_of_library, folder, headline_with, json, library, message, stdout,
 };
 
 /// The smallest number of scenarios that the library holds.
@@ -227,6 +227,42 @@ fn a_folder_runs_the_scenarios_of_one_function_and_names_the_others() {
     let both = ["aeb/aeb-lead-brakes", "paper-figure"].map(|name| library(name).display().to_string());
     let refused = closecall(["campaign", &both[0], &both[1], "-n", "2"]);
     assert!(message(&refused).contains("run them apart"), "{}", message(&refused));
+}
+
+#[test]
+fn a_folder_leaves_out_the_scenarios_whose_faults_cannot_act_and_does_not_pass() {
+    let folder = folder();
+    for name in ["overtake-without-brake", "faults/camera-dead", "faults/camera-dirty"] {
+        let name = library(name);
+        std::fs::copy(&name, folder.path().join(name.file_name().unwrap())).unwrap();
+    }
+    let (path, out) = (folder.path().to_str().unwrap().to_owned(), folder.path().join("out"));
+    let campaign = |mode: &str, more: &[&str]| {
+        let usual =
+            ["campaign", &path, "-n", "60", "--sensors", mode, "--format", "json", "--out", out.to_str().unwrap()];
+        closecall(usual.iter().chain(more))
+    };
+    // The other scenario passes.
+    let gate = ["--max-collisions", "0"];
+    let output = campaign("object", &gate);
+    let report = json(&output, 4);
+    assert_eq!(report["verdict"], "NOT JUDGED", "{report:#}");
+    let why = "not run: camera-dead, camera-dirty: `fault.rear-camera` contradicts `sensors.mode`";
+    assert!(report["reasons"][0].as_str().unwrap().starts_with(why), "{report:#}");
+    assert!(message(&output).contains(why), "{}", message(&output));
+    let names: Vec<&str> =
+        report["scenarios"].as_array().unwrap().iter().map(|scenario| scenario["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["overtake-without-brake"]);
+    // The folder of the results knows it: the campaign that goes on does not pass either.
+    let again = json(&campaign("object", &["--resume", gate[0], gate[1]]), 4);
+    assert_eq!(again["verdict"], "NOT JUDGED");
+    std::fs::remove_dir_all(&out).unwrap();
+    // A measurement has no verdict, and says it all the same.
+    let measured = json(&campaign("object", &["--no-gate"]), 0);
+    assert!(measured["reasons"].to_string().contains(why), "{measured:#}");
+    // None of the named scenarios can run.
+    let alone = closecall(["campaign", "camera-dead", "lidar-dead", "-n", "2", "--sensors", "object"]);
+    assert!(message(&alone).contains("camera-dead.toml") && code(&alone) == 3, "{}", message(&alone));
 }
 
 #[test]

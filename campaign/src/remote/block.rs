@@ -81,6 +81,7 @@ impl BlockRunner {
         plan.workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout };
         plan.retry_crashed = sent.retry_crashed;
         plan.without_effect.clone_from(&sent.without_effect);
+        plan.left_out.clone_from(&sent.left_out);
         let manifest = plan.manifest_in(sent.command.clone(), local.controller_folder())?;
         let differences = sent.differences(&manifest);
         if !differences.is_empty() {
