@@ -69,13 +69,15 @@ fn advice(error: &CliError) -> Option<&'static str> {
             Some("`closecall campaign … --design search` looks for a first case")
         }
         CliError::Causes(CausesError::Foreign { .. }) => Some("--out FILE names the file"),
-        CliError::Causes(CausesError::Map(MapError::OfGrid { parameter, .. })) => Some(match *parameter {
-            "speed-mps" => "--speed-mps sets it",
-            "closing-mps" => "--closing-kmh sets it",
-            "detection-m" => "--detection-m sets it",
-            "front-thw-s" => "--front-thw-s sets it",
-            _ => "it follows from --detection-m and --closing-kmh",
-        }),
+        CliError::Causes(CausesError::Map(MapError::OfGrid { parameter, .. } | MapError::Value { parameter, .. })) => {
+            Some(match *parameter {
+                "speed-mps" => "--speed-mps sets it",
+                "closing-mps" => "--closing-kmh sets it",
+                "detection-m" => "--detection-m sets it",
+                "front-thw-s" => "--front-thw-s sets it",
+                _ => "it follows from --detection-m and --closing-kmh",
+            })
+        }
         CliError::Classifier(ClassifierError::NeedsOnnxRuntime) => {
             Some("--onnxruntime PATH names its libonnxruntime.so")
         }

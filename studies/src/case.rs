@@ -136,9 +136,9 @@ impl CausesError {
             Self::Folder(error) => FailureKind::from(error),
             Self::Map(MapError::Scenario(error)) if error.is_setting() => FailureKind::Usage,
             Self::Map(MapError::Scenario(_)) => FailureKind::InvalidInput,
-            Self::Map(MapError::NoMis { .. } | MapError::OfGrid { .. } | MapError::Sensors { .. }) => {
-                FailureKind::Usage
-            }
+            Self::Map(
+                MapError::NoMis { .. } | MapError::OfGrid { .. } | MapError::Value { .. } | MapError::Sensors { .. },
+            ) => FailureKind::Usage,
             Self::Map(MapError::Point { .. }) => FailureKind::Sample,
             Self::Write(_) => FailureKind::Io,
             Self::Scenario(error) if error.is_io() => FailureKind::Io,

@@ -318,6 +318,22 @@ fn the_map_agrees_with_theory_or_says_why() {
 }
 
 #[test]
+fn a_value_that_no_point_of_the_map_can_have_names_its_option() {
+    for (option, value, allowed) in [
+        ("--front-thw-s", "0.7,1e9", "a number from 0.2 to 5 is needed (with front-thw-s = 1000000000)"),
+        ("--speed-mps", "1e9", "is needed (with speed-mps = 1000000000)"),
+        ("--closing-kmh", "1e9", "is needed (with closing-mps = "),
+        ("--detection-m", "1e9", "is needed (with detection-m = 1000000000)"),
+    ] {
+        let refused = closecall(["study", "map", option, value]);
+        let message = message(&refused);
+        assert_eq!(code(&refused), 2, "{option}: {message}");
+        assert!(message.contains("failed to make a point of the map: ") && message.contains(allowed), "{message}");
+        assert!(message.contains(&format!("{option} sets it")), "{message}");
+    }
+}
+
+#[test]
 fn the_net_effect_is_recomputed_from_its_inputs_or_cannot_be_said() {
     let parent = folder();
     let path = campaign(parent.path(), "paired", 100, &["--paired"]);

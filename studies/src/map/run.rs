@@ -49,6 +49,14 @@ pub enum MapError {
         /// The parameter.
         parameter: &'static str,
     },
+    /// No scenario can have a value of the grid.
+    #[error("failed to make a point of the map: {reason}")]
+    Value {
+        /// The parameter of the grid.
+        parameter: &'static str,
+        /// The value that it leads to, and what is allowed.
+        reason: String,
+    },
     /// The settings ask for tracks that are not true.
     #[error(
         "the map needs true tracks, as the theory assumes them: `sensors.mode` is `{mode}`, and may only be `ground-truth`"
@@ -162,6 +170,16 @@ fn leaves_grid(setting: &Setting) -> Result<(), MapError> {
     }
 }
 
+/// Returns the error of a point, which names the first parameter of the grid that it depends on.
+fn of_grid(error: ScenarioError) -> MapError {
+    if let ScenarioError::Value { source, at, .. } = &error
+        && let Some(parameter) = GRID_PARAMETERS.into_iter().find(|name| at.contains(&format!("{name} = ")))
+    {
+        return MapError::Value { parameter, reason: format!("{source}{at}") };
+    }
+    error.into()
+}
+
 /// One point of the grid.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
@@ -189,7 +207,7 @@ impl Cell {
         ];
         let named = |(name, value)| Some((ParameterName::new(name)?, Value::Number(value)));
         let parameters: Parameters = values.into_iter().filter_map(named).collect();
-        let scenario = file.concrete(&parameters)?;
+        let scenario = file.concrete(&parameters).map_err(of_grid)?;
         let CheckedDriver::Ego(ego) = &scenario.actors[scenario.ego].driver else {
             return Err(self.failed(SampleError::Panic { message: "the map has no ego".to_owned() }));
         };
