@@ -251,7 +251,8 @@ fn the_quality_checkers_find_no_issue_in_any_scenario_of_the_library() {
     let names: Vec<_> = library::names().collect();
     for name in &names {
         let case = folder.path().join(name.replace('/', "-"));
-        stdout(&run(&format!("tool export {name} --sensors ground-truth -o"), &case), 0);
+        // The checkers need their time for the points of the open loop: a short one has all elements.
+        stdout(&run(&format!("tool export {name} --sensors ground-truth --set duration-s=15 -o"), &case), 0);
     }
     // A line, a spiral, an arc, and a spiral through an inflection.
     let course = "[{s-m=0.0,curvature-per-m=0.0},{s-m=200.0,curvature-per-m=0.002},\
@@ -275,6 +276,12 @@ fn the_quality_checkers_find_what_is_wrong() {
         let said = quality(&python, folder.path());
         assert!(!said.ends_with(", 0 issues\n"), "{wrong}: {said}");
     }
+    // A wrong road behind a right one.
+    fs::write(&path, &files["closed-loop.xosc"]).unwrap();
+    assert!(quality(&python, folder.path()).ends_with(", 0 issues\n"));
+    fs::write(folder.path().join("wrong.xodr"), files["road.xodr"].replace("rule=\"RHT\"", "rule=\"right\"")).unwrap();
+    let said = quality(&python, folder.path());
+    assert!(said.contains("wrong.xodr: check_asam_xodr_xml_valid_schema"), "{said}");
 }
 
 /// Runs the readers of OSI on these files, and returns their results.

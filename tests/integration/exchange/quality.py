@@ -3,6 +3,7 @@
 A checker that ended in an error counts as an issue; the last line is the number of files and of completed checks.
 """
 import contextlib
+import functools
 import io
 import logging
 import sys
@@ -10,9 +11,12 @@ from pathlib import Path
 
 import qc_opendrive.main
 import qc_openscenario.main
+import xmlschema
 from qc_baselib import Configuration, Result, StatusType
 
 logging.disable(logging.CRITICAL)
+# The checker of OpenDRIVE reads the schema for each file, which takes longer than the check.
+xmlschema.XMLSchema11 = functools.cache(xmlschema.XMLSchema11)
 BUNDLES = {".xosc": (qc_openscenario, "xoscBundle"), ".xodr": (qc_opendrive, "xodrBundle")}
 
 
