@@ -32,6 +32,7 @@ pub struct Setup {
     settings: *const Setting,
     setting_count: u64,
     settings_json: *const c_char,
+    lane_widths_m: *const f64,
 }
 
 /// The input of one control step. This controller reads no tracks.

@@ -27,9 +27,10 @@ def turn(pose):
 # Returns the vehicles in a scan: the face that looks at the ego, its time before the end of the scan, and what is seen of its class.
 def vehicles(scan, odometry, road):
     x, y, z = (array(scan, name) for name in ("x_m", "y_m", "z_m"))
-    width, lane = road["lane_width_m"], odometry["lane"]
-    left = y - 0.5 * (road["curvature_per_m"] or 0.0) * x * x + odometry["lane_offset_m"] + (0.5 - lane) * width
-    kept = (z > ROAD_Z_M) & (z < 4.5) & (left < -0.3) & (left > 0.3 - road["lanes"] * width)
+    widths, lane = road["lane_widths_m"], odometry["lane"]
+    left_edge = sum(widths[:lane]) - 0.5 * widths[lane - 1] - odometry["lane_offset_m"]
+    left = y - 0.5 * (road["curvature_per_m"] or 0.0) * x * x - left_edge
+    kept = (z > ROAD_Z_M) & (z < 4.5) & (left < -0.3) & (left > 0.3 - sum(widths))
     x, y, z, age_s = x[kept], y[kept], z[kept], (scan["end_ns"] - scan["start_ns"] - array(scan, "offset_ns", "<u4")[kept]) * 1e-9
     if not x.size:
         return

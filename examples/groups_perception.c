@@ -41,7 +41,7 @@ typedef struct {
 } place;
 
 typedef struct {
-    double lane_width_m;
+    double lane_widths_m[8];
     uint32_t lanes, id;
     place places[PLACES]; /* the latest is the last */
     int count;
@@ -68,7 +68,10 @@ static face face_of(const point *points, size_t count) {
 
 /* Lists the faces of a scan, at most `most`, the nearest first. Returns their number, or -1 without memory. */
 static int faces(const follower *own, const closecall_perception_input *in, const closecall_scan *scan, face *list, int most) {
-    double left_m = (in->lane - 0.5) * own->lane_width_m - in->lane_offset_m, right_m = left_m - own->lanes * own->lane_width_m;
+    double left_m = -0.5 * own->lane_widths_m[in->lane - 1] - in->lane_offset_m, right_m;
+    for (uint32_t lane = 0; lane < in->lane; lane++) left_m += own->lane_widths_m[lane];
+    right_m = left_m;
+    for (uint32_t lane = 0; lane < own->lanes; lane++) right_m -= own->lane_widths_m[lane];
     double sweep_ns = (double)(scan->end_ns - scan->start_ns);
     point *points = malloc((scan->point_count + 1) * sizeof *points);
     if (!points) return -1;
@@ -109,8 +112,8 @@ const char *closecall_perception_version(void) { return "1"; }
 void *closecall_perception_create(const closecall_perception_setup *setup) {
     follower *own = calloc(1, sizeof *own);
     if (!own) return NULL;
-    own->lane_width_m = setup->lane_width_m;
-    own->lanes = setup->lanes;
+    own->lanes = setup->lanes < 8 ? setup->lanes : 8;
+    memcpy(own->lane_widths_m, setup->lane_widths_m, own->lanes * sizeof(double));
     return own;
 }
 

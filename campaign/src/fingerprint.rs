@@ -56,7 +56,10 @@ impl Fingerprint {
     /// process that cannot be greeted has no identity.
     pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
         let greeted = scenario.and_then(|scenario| match &scenario.actors[scenario.ego].driver {
-            CheckedDriver::Ego(ego) => identify(settings, folder, ego, &scenario.road).ok(),
+            CheckedDriver::Ego(ego) => {
+                let lane = scenario.road.lane_at(scenario.actors[scenario.ego].start.d_m);
+                identify(settings, folder, ego, (&scenario.road, lane)).ok()
+            }
             CheckedDriver::Human(_) => None,
         });
         let (identity, open_files) = greeted.unwrap_or_default();

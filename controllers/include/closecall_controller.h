@@ -68,7 +68,7 @@ typedef struct {
 /* The data that a controller receives when it is created. */
 typedef struct {
     double control_step_s;   /* time between two steps (s): 0.04 */
-    double lane_width_m;     /* (m) */
+    double lane_width_m;     /* width of the ego's lane (m) */
     double curvature_per_m;  /* curvature of the road (1/m), positive to the left; NaN if it changes along the road */
     double speed_limit_mps;  /* (m/s) */
     uint32_t lanes;          /* number of lanes; lane 1 is the leftmost */
@@ -76,6 +76,7 @@ typedef struct {
     const closecall_setting *settings;
     uint64_t setting_count;
     const char *settings_json; /* the same settings as JSON, with the texts among them; UTF-8 */
+    const double *lane_widths_m; /* width of each lane, from lane 1 on (m): `lanes` numbers */
 } closecall_setup;
 
 /* The perceived state of another vehicle. */
@@ -154,7 +155,7 @@ CLOSECALL_EXPORT const char *closecall_controller_name(void);
 CLOSECALL_EXPORT const char *closecall_controller_version(void);
 
 #if UINTPTR_MAX == UINT64_MAX && defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
-_Static_assert(sizeof(closecall_setup) == 64, "layout of closecall_setup");
+_Static_assert(sizeof(closecall_setup) == 72, "layout of closecall_setup");
 _Static_assert(sizeof(closecall_track) == 272, "layout of closecall_track");
 _Static_assert(sizeof(closecall_input) == 128, "layout of closecall_input");
 _Static_assert(sizeof(closecall_command) == 16, "layout of closecall_command");

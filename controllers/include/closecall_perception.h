@@ -93,7 +93,7 @@ typedef struct {
     double latency_s;        /* time from a scan to the tracks that the controller gets (s) */
     double ego_length_m;     /* (m) */
     double ego_width_m;      /* (m) */
-    double lane_width_m;     /* (m) */
+    double lane_width_m;     /* width of the ego's lane (m) */
     double curvature_per_m;  /* curvature of the road (1/m), positive to the left; NaN if it changes along the road */
     double speed_limit_mps;  /* (m/s) */
     uint32_t lanes;          /* number of lanes; lane 1 is the leftmost */
@@ -105,6 +105,7 @@ typedef struct {
     const closecall_camera *camera; /* the first one; NULL without images */
     const closecall_camera *additional_cameras; /* further rear cameras; none without images */
     uint64_t additional_camera_count;
+    const double *lane_widths_m; /* width of each lane, from lane 1 on (m): `lanes` numbers */
 } closecall_perception_setup;
 
 /* A complete scan of a LiDAR, with one element of each array for each point. */
@@ -244,7 +245,7 @@ CLOSECALL_EXPORT const char *closecall_perception_version(void);
 _Static_assert(sizeof(closecall_lidar) == 72, "layout of closecall_lidar");
 _Static_assert(sizeof(closecall_radar) == 80, "layout of closecall_radar");
 _Static_assert(sizeof(closecall_camera) == 88, "layout of closecall_camera");
-_Static_assert(sizeof(closecall_perception_setup) == 120, "layout of closecall_perception_setup");
+_Static_assert(sizeof(closecall_perception_setup) == 128, "layout of closecall_perception_setup");
 _Static_assert(sizeof(closecall_scan) == 80, "layout of closecall_scan");
 _Static_assert(sizeof(closecall_radar_detection) == 24, "layout of closecall_radar_detection");
 _Static_assert(sizeof(closecall_radar_scan) == 32, "layout of closecall_radar_scan");

@@ -116,7 +116,10 @@ class Road:
 
     #: Number of lanes; lane 1 is the leftmost.
     lanes: int
+    #: Width of the ego's lane (m).
     lane_width_m: float
+    #: Width of each lane, from lane 1 on (m).
+    lane_widths_m: Sequence[float]
     #: Curvature (1/m), positive to the left; ``None`` if it changes along the road.
     curvature_per_m: float | None
     speed_limit_mps: float

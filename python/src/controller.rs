@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use closecall_controllers::external::RoadMessage;
 use closecall_controllers::external::watch::Call;
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, LeadVehicleSelector, Reason,
@@ -12,7 +13,7 @@ use closecall_controllers::{
 use closecall_simulation::ControllerFactory;
 use closecall_simulation::controller::hosted::{self, HostedProcess, Registration, register};
 use closecall_simulation::controller::isolated::Isolated;
-use closecall_traffic::{CONTROL_STEP, Road};
+use closecall_traffic::{CONTROL_STEP, Lane, Road};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -207,7 +208,7 @@ impl Controller {
         let step = match &self.step {
             Some(step) => step.bind(py),
             None => {
-                let step = self.start(py, input.road)?;
+                let step = self.start(py, (input.road, input.odometry.lane))?;
                 self.step.insert(step).bind(py)
             }
         };
@@ -218,7 +219,7 @@ impl Controller {
     }
 
     /// Creates the object, calls its method `start` if it has one, and returns its method `step`.
-    fn start(&mut self, py: Python<'_>, road: &Road) -> PyResult<Py<PyAny>> {
+    fn start(&mut self, py: Python<'_>, road: (&Road, Lane)) -> PyResult<Py<PyAny>> {
         self.thread = py.import("threading")?.call_method0("get_ident")?.extract()?;
         lock(&self.shared.threads).insert(self.thread, Instant::now());
         let started = self.create(py, road);
@@ -226,10 +227,10 @@ impl Controller {
         started
     }
 
-    fn create(&self, py: Python<'_>, road: &Road) -> PyResult<Py<PyAny>> {
+    fn create(&self, py: Python<'_>, (road, lane): (&Road, Lane)) -> PyResult<Py<PyAny>> {
         let object = self.create.bind(py).call0()?;
         if let Ok(start) = object.getattr("start") {
-            start.call1((Setup::new(&self.settings, road),))?;
+            start.call1((Setup::new(&self.settings, road, lane),))?;
         }
         Ok(object.getattr("step")?.unbind())
     }
@@ -306,17 +307,11 @@ fn with_traceback(message: &str, traceback: &str) -> String {
 }
 
 /// Returns the settings of the ego stack and the road as JSON, with the keys of the protocol of external processes.
-fn setup_json(settings: &EgoSettings, road: &Road) -> String {
+fn setup_json(settings: &EgoSettings, road: &Road, lane: Lane) -> String {
     json!({
         "control_step_s": CONTROL_STEP.s(),
         "settings": settings,
-        "road": {
-            "lanes": road.lanes(),
-            "lane_width_m": road.lane_width_m(),
-            "curvature_per_m": road.constant_curvature_per_m(),
-            "speed_limit_mps": road.speed_limit_mps(),
-            "overtaking_side": road.overtaking_side(),
-        },
+        "road": RoadMessage::of(road, lane),
     })
     .to_string()
 }

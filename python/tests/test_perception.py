@@ -26,8 +26,8 @@ COVARIANCE = [[0.04, 0.0, 0.0, 0.0], [0.0, 0.04, 0.0, 0.0], [0.0, 0.0, 0.25, 0.0
 def face(input: PerceptionInput, setup: PerceptionSetup) -> tuple[float, float, float, int] | None:
     """The face of the nearest vehicle in the lanes: its middle, the mean age of its points, and their number."""
     road, odometry = setup.road, input.odometry
-    left_m = (odometry.lane - 0.5) * road.lane_width_m - odometry.lane_offset_m
-    right_m = left_m - road.lanes * road.lane_width_m
+    left_m = sum(road.lane_widths_m[: odometry.lane]) - 0.5 * road.lane_width_m - odometry.lane_offset_m
+    right_m = left_m - sum(road.lane_widths_m)
     for scan in input.scans:
         ends = zip(scan.x_m, scan.y_m, scan.z_m, scan.offset_ns, strict=True)
         points = [

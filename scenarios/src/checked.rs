@@ -249,6 +249,7 @@ impl ScenarioConfig {
         let mut checked = Vec::with_capacity(self.actors.len());
         for (((index, actor), driver), path) in self.actors.iter().enumerate().zip(drivers).zip(paths) {
             check_path_grip(path.as_ref(), states[index].speed_mps, friction).map_err(|error| at(index, error))?;
+            check_room(&vehicles[index], &states[index], road).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
             let entering = Entering { driver: &driver, vehicle: &vehicles[index], start: &states[index] };
             entering.check(road, friction, duration).map_err(|error| at(index, error))?;
@@ -377,6 +378,18 @@ fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) ->
     );
     let problem = Problem::Contradiction { other: "environment.friction", rule };
     Err(ConfigError::new("sdlp-m", problem).within("lane-keeping"))
+}
+
+/// Rejects a vehicle that is wider than the lane in which it starts.
+fn check_room(vehicle: &Vehicle, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
+    let lane = road.lane_at(start.d_m);
+    let (width_m, lane_m) = (vehicle.dimensions.width_m, road.lane_width_m(lane));
+    if width_m <= lane_m {
+        return Ok(());
+    }
+    let rule = format!("the vehicle is {width_m} m wide, and lane {lane}, in which it starts, is {lane_m} m wide");
+    let problem = Problem::Contradiction { other: "road.lane-width-m", rule };
+    Err(ConfigError::new("width-m", problem).within("vehicle"))
 }
 
 /// Rejects a prescribed driver that would change to a lane that the road does not have.

@@ -89,11 +89,13 @@ pub(super) fn refuse_of_map(
         return Err(located(error));
     }
     let [least_per_m, most_per_m] = road.curvature_range_per_m();
+    let [narrowest_m, widest_m] = road.lane_width_range_m();
     let curvatures_per_m = road.alignment().map_or(Road::CURVATURE_PER_M, |_| Alignment::CURVATURE_PER_M);
     let of_map = [
         (&odometry.curvature_per_m, "curvature-per-m", least_per_m, curvatures_per_m),
         (&odometry.curvature_per_m, "curvature-per-m", most_per_m, curvatures_per_m),
-        (&odometry.lane_width_m, "lane-width-m", road.lane_width_m(), Road::LANE_WIDTH_M),
+        (&odometry.lane_width_m, "lane-width-m", narrowest_m, Road::LANE_WIDTH_M),
+        (&odometry.lane_width_m, "lane-width-m", widest_m, Road::LANE_WIDTH_M),
     ];
     for (num, key, actual, range) in of_map {
         range.check(actual + value(num, key).map_err(located)?, key).map_err(located)?;
@@ -144,6 +146,12 @@ mod tests {
             ("[fault.odometry]\nrails-missing = true".to_owned(), "fault.odometry.rails-missing", "`road.guard-rails`"),
             (
                 "road.lane-width-m = 4.5\n[fault.odometry]\nlane-width-m = 0.6".to_owned(),
+                "fault.odometry.lane-width-m",
+                "from 2.5 to 5",
+            ),
+            // Only the widest lane is too wide on the map.
+            (
+                "road.lane-width-m = [3.5, 3.75, 4.5]\n[fault.odometry]\nlane-width-m = 0.6".to_owned(),
                 "fault.odometry.lane-width-m",
                 "from 2.5 to 5",
             ),

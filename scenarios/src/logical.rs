@@ -27,7 +27,7 @@ use closecall_controllers::{
 use closecall_recorded::encounter::{Approach, Party, Variation};
 use closecall_recorded::fit::MIN_VALUES;
 use closecall_traffic::statistics::quantiles::quantile;
-use closecall_traffic::{ActorId, Num, ParameterName, RoadConfig, VehicleClass, VehicleConfig};
+use closecall_traffic::{ActorId, LaneWidthsConfig, Num, ParameterName, RoadConfig, VehicleClass, VehicleConfig};
 
 use super::config::{
     AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, Function, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig,
@@ -229,7 +229,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
         duration_s: rounded(gap_m / slowest_mps + AFTERWARDS_S),
         road: RoadConfig {
             lanes: approach.lanes,
-            lane_width_m: rounded(approach.lane_width_m),
+            lane_width_m: LaneWidthsConfig::Equal(rounded(approach.lane_width_m)),
             curvature_per_m: Num::Fixed(0.0),
             alignment: Vec::new(),
             alignment_d_m: None,

@@ -27,7 +27,7 @@ use closecall_controllers::{
 use closecall_recorded::encounter::{EGO_INDEX, LONGEST_THW_S, Participant, RecordedEncounter};
 use closecall_recorded::filters::PERIOD;
 use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
-use closecall_traffic::{ActorId, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
+use closecall_traffic::{ActorId, LaneWidthsConfig, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item};
 
 use crate::coverage::CoverageConfig;
@@ -182,7 +182,7 @@ pub(super) fn with_actors(encounter: &RecordedEncounter, title: Title, actors: V
         duration_s: rounded(encounter.end.s()),
         road: RoadConfig {
             lanes: encounter.lanes,
-            lane_width_m: rounded(encounter.lane_width_m),
+            lane_width_m: LaneWidthsConfig::Equal(rounded(encounter.lane_width_m)),
             curvature_per_m: Num::Fixed(0.0),
             alignment: Vec::new(),
             alignment_d_m: None,

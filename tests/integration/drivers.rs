@@ -154,7 +154,7 @@ impl Observer for Crossing {
         let [ego, rear] = ["ego", "rear"].map(|id| &view.vehicles[index(id)]);
         let lengths_m = ego.vehicle.dimensions.length_m + rear.vehicle.dimensions.length_m;
         let thw_s = (ego.state.s_m - rear.state.s_m - 0.5 * lengths_m) / rear.state.speed_mps;
-        let marking_m = -view.scenario.road.lane_width_m();
+        let marking_m = view.scenario.road.boundary_m(1);
         let beyond_m = rear.state.d_m - marking_m;
         if let (Some((beyond_before_m, thw_before_s)), None) = (self.before, self.thw_s)
             && beyond_m >= 0.0
@@ -181,6 +181,25 @@ fn steady_and_weaving() -> [ScenarioFile; 2] {
     let weaving = "lane-keeping = { sdlp-m = 0.2 }\nspeed-keeping = { acceleration-noise-mps2 = 0.1 }\n\n[sensors]";
     assert!(text.contains("[[actor]]\nid = \"rear\"") && text.contains("\n\n[sensors]"));
     [load("steady.toml", &text), load("weaving.toml", &text.replace("\n[sensors]", weaving))]
+}
+
+#[test]
+fn the_marking_of_a_lane_of_its_own_width_is_crossed_at_the_headway_of_the_scenario() {
+    let name = ParameterName::new("cut-out-thw-s").unwrap();
+    let largest_error_s = |widths: &str| {
+        let settings = [format!("road.lane-width-m={widths}").parse().unwrap()];
+        let file = ScenarioFile::load(&library("overtake-without-brake"), &settings).unwrap();
+        let errors_s = (0..5).map(|index| {
+            let (mut crossing, scenario) = (Crossing::default(), sample(&file, 5, index));
+            simulate(&scenario, RunKey { seed: 5, sample: index }, &arm(BuiltIn::Acc), &mut crossing).unwrap();
+            let Some(Value::Number(drawn_s)) = scenario.parameters.get(&name) else { panic!("{name} is a number") };
+            (crossing.thw_s.unwrap() - drawn_s).abs()
+        });
+        errors_s.fold(0.0, f64::max)
+    };
+    let [equal_s, wide_s, narrow_s] = ["3.75", "[5.0,3.0,3.75]", "[3.0,5.0,3.75]"].map(largest_error_s);
+    // Half way between the centres, 0.5 m beside the marking, the error would be several times as large.
+    assert!(wide_s < 2.0 * equal_s && narrow_s < 2.0 * equal_s, "{equal_s} {wide_s} {narrow_s}");
 }
 
 #[test]

@@ -123,17 +123,18 @@ impl<'a> EgoFrame<'a> {
     /// A vehicle counts as being in a lane if its centre is. The centre lies at `d_m` with the
     /// standard deviation `sd_m`.
     pub fn lane_probabilities(&self, d_m: f64, sd_m: f64) -> [f64; 3] {
-        let width_m = self.road.lane_width_m();
-        let left_edge_m = self.road.lane_centre_m(self.lane) + 0.5 * width_m;
+        let lanes =
+            [self.road.beside(self.lane, Side::Left), Some(self.lane), self.road.beside(self.lane, Side::Right)];
+        let [left_m, own_m, right_m] = lanes.map(|lane| lane.map_or(0.0, |lane| self.road.lane_width_m(lane)));
+        let edge_m = self.road.lane_centre_m(self.lane) + 0.5 * own_m;
         // Probabilities that the centre lies to the right of each of the four edges of these lanes,
         // from left to right.
-        let right_of = [1.0, 0.0, -1.0, -2.0].map(|lanes| normal_cdf(left_edge_m + lanes * width_m - d_m, sd_m));
-        let in_lane = |index: usize, exists: bool| if exists { right_of[index] - right_of[index + 1] } else { 0.0 };
-        [
-            in_lane(0, self.road.beside(self.lane, Side::Left).is_some()),
-            in_lane(1, true),
-            in_lane(2, self.road.beside(self.lane, Side::Right).is_some()),
-        ]
+        let edges_m = [edge_m + left_m, edge_m, edge_m - own_m, edge_m - (own_m + right_m)];
+        let right_of = edges_m.map(|edge_m| normal_cdf(edge_m - d_m, sd_m));
+        std::array::from_fn(|index| match lanes[index] {
+            Some(_) => right_of[index] - right_of[index + 1],
+            None => 0.0,
+        })
     }
 }
 
@@ -202,6 +203,25 @@ mod tests {
         assert_eq!(frame.lane_probabilities(-9.0, 0.0), [0.0, 0.0, 1.0]);
         let [left, own, right] = frame.lane_probabilities(-3.75, 0.5);
         assert!((left - 0.5).abs() < 1e-9 && (own - 0.5).abs() < 1e-9 && right == 0.0);
+    }
+
+    #[test]
+    fn lane_probabilities_follow_the_edges_of_lanes_of_their_own_widths() {
+        let road = Road::straight(3).with_lane_widths(&[4.0, 3.0, 3.5]);
+        let state = ego(-5.5, 0.0);
+        let frame = EgoFrame::new(&road, &state);
+        for (d_m, expected) in [
+            (0.1, [0.0, 0.0, 0.0]),
+            (-0.1, [1.0, 0.0, 0.0]),
+            (-3.9, [1.0, 0.0, 0.0]),
+            (-4.1, [0.0, 1.0, 0.0]),
+            (-6.9, [0.0, 1.0, 0.0]),
+            (-7.1, [0.0, 0.0, 1.0]),
+            (-10.4, [0.0, 0.0, 1.0]),
+            (-10.6, [0.0, 0.0, 0.0]),
+        ] {
+            assert_eq!(frame.lane_probabilities(d_m, 0.0), expected, "{d_m}");
+        }
     }
 
     #[test]

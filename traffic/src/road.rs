@@ -8,6 +8,9 @@
 //!              ─────────────────────────────  right edge at d = −n·w
 //! ```
 //!
+//! Lanes of their own widths lie beside each other in the same way: the right edge of lane k is at
+//! d = −(w₁ + … + w_k).
+//!
 //! The reference line is d = 0. Its curvature is positive if the road bends to the left. It is
 //! constant, or follows an [`Alignment`] of lines, arcs and clothoids. An alignment can lie beside
 //! d = 0: it then is the reference line, along which s is measured.
@@ -21,9 +24,12 @@ use serde::{Deserialize, Serialize};
 
 mod alignment;
 mod course;
+mod widths;
 
 pub use alignment::{Alignment, AlignmentPiece, AlignmentPoint, AlignmentPointConfig};
 pub(crate) use course::{Course, OffsetLine};
+pub use widths::LaneWidthsConfig;
+use widths::{LaneWidths, MOST_LANES};
 
 use crate::acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
@@ -97,9 +103,10 @@ pub struct PlanePose {
 pub struct RoadConfig {
     /// Number of lanes in the direction of travel, 1 to 8.
     pub lanes: u8,
-    /// Width of each lane (m).
+    /// Width of each lane (m): one number for all lanes, or a list with one for each lane, from lane 1
+    /// (leftmost) on.
     #[serde(default = "default_lane_width")]
-    pub lane_width_m: Num,
+    pub lane_width_m: LaneWidthsConfig,
     /// Curvature of the left edge (1/m), positive if the road bends to the left.
     #[serde(default = "default_curvature")]
     pub curvature_per_m: Num,
@@ -129,8 +136,8 @@ pub struct RoadConfig {
     pub acceleration_lane: Option<AccelerationLaneConfig>,
 }
 
-fn default_lane_width() -> Num {
-    Num::Fixed(3.75)
+fn default_lane_width() -> LaneWidthsConfig {
+    LaneWidthsConfig::Equal(Num::Fixed(3.75))
 }
 fn default_curvature() -> Num {
     Num::Fixed(0.0)
@@ -147,7 +154,7 @@ fn default_overtaking_side() -> Side {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Road {
     lanes: u8,
-    lane_width_m: f64,
+    widths: LaneWidths,
     course: Course,
     speed_limit_mps: f64,
     overtaking_side: Side,
@@ -191,7 +198,7 @@ impl Check for RoadConfig {
         }
         Ok(Road {
             lanes: self.lanes,
-            lane_width_m: number(&self.lane_width_m, "lane-width-m", Road::LANE_WIDTH_M)?,
+            widths: self.lane_width_m.check(self.lanes, parameters)?,
             course,
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
@@ -224,7 +231,7 @@ impl Road {
     pub fn straight(lanes: u8) -> Self {
         Self {
             lanes: lanes.clamp(1, 8),
-            lane_width_m: 3.75,
+            widths: LaneWidths::Equal(3.75),
             course: Course::Constant(0.0),
             speed_limit_mps: 36.1,
             overtaking_side: Side::Left,
@@ -267,10 +274,23 @@ impl Road {
         }
     }
 
-    /// Returns the same road with lanes of another width (m), clamped to 2.5 to 5 m.
+    /// Returns the same road with as many lanes as these widths (m), 1 to 8 of them. Each width is
+    /// clamped to 2.5 to 5 m, and belongs to a lane from lane 1 on.
     #[must_use]
-    pub fn with_lane_width(self, lane_width_m: f64) -> Self {
-        Self { lane_width_m: lane_width_m.clamp(2.5, 5.0), ..self }
+    pub fn with_lane_widths(self, widths_m: &[f64]) -> Self {
+        let widths_m: Vec<f64> = widths_m.iter().take(MOST_LANES).map(|width_m| clamped_width_m(*width_m)).collect();
+        match u8::try_from(widths_m.len()) {
+            Ok(lanes) if lanes > 0 => Self { lanes, widths: LaneWidths::new(&widths_m), ..self },
+            _ => self,
+        }
+    }
+
+    /// Returns the same road with lanes that are wider by `added_m` (m). The results are clamped to
+    /// 2.5 to 5 m.
+    #[must_use]
+    pub fn with_added_lane_width(self, added_m: f64) -> Self {
+        let widths = self.widths.changed(self.lanes, |width_m| clamped_width_m(width_m + added_m));
+        Self { widths, ..self }
     }
 
     /// Returns the same road with an acceleration lane, which is one of its lanes. A road of one lane
@@ -285,7 +305,8 @@ impl Road {
     /// are measured along its left edge, which is the right edge of the mirror image.
     pub fn mirrored(self) -> Option<Self> {
         let overtaking_side = self.overtaking_side.opposite();
-        self.is_straight().then_some(Self { overtaking_side, ..self })
+        let widths = self.widths.reversed(self.lanes);
+        self.is_straight().then_some(Self { overtaking_side, widths, ..self })
     }
 
     /// Returns the same road in the opposite direction: s runs against the traffic, and d = 0 is
@@ -303,7 +324,8 @@ impl Road {
         let overtaking_side = self.overtaking_side.opposite();
         let acceleration_lane =
             self.acceleration_lane.map(|lane| lane.moved(|s_m| self.reversed_position_m(s_m, 0.0).0));
-        Self { course, overtaking_side, acceleration_lane, is_reversed: !self.is_reversed, ..self }
+        let widths = self.widths.reversed(self.lanes);
+        Self { course, overtaking_side, acceleration_lane, widths, is_reversed: !self.is_reversed, ..self }
     }
 
     /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point
@@ -336,9 +358,34 @@ impl Road {
         self.lanes
     }
 
-    /// Returns the width of each lane (m).
-    pub fn lane_width_m(&self) -> f64 {
-        self.lane_width_m
+    /// Returns the width of a lane (m). An acceleration lane has it where it does not narrow.
+    pub fn lane_width_m(&self, lane: Lane) -> f64 {
+        self.widths.width_m(lane)
+    }
+
+    /// Returns the widths of the lanes (m), from lane 1 on.
+    pub fn lane_widths_m(&self) -> impl Iterator<Item = f64> {
+        (1..=self.lanes).map(|lane| self.widths.width_m(Lane(lane)))
+    }
+
+    /// Returns the width of every lane (m), or `None` if the lanes have different widths.
+    pub fn equal_lane_width_m(&self) -> Option<f64> {
+        match self.widths {
+            LaneWidths::Equal(width_m) => Some(width_m),
+            LaneWidths::Each(_) => None,
+        }
+    }
+
+    /// Returns the widths of the narrowest and of the widest lane (m).
+    pub fn lane_width_range_m(&self) -> [f64; 2] {
+        let range = |[low_m, high_m]: [f64; 2], width_m: f64| [low_m.min(width_m), high_m.max(width_m)];
+        self.lane_widths_m().fold([f64::INFINITY, f64::NEG_INFINITY], range)
+    }
+
+    /// Returns the lateral position of a boundary of the lanes (m). Boundary 0 is the left edge of lane
+    /// 1, and boundary n is the right edge of lane n.
+    pub fn boundary_m(&self, number: u8) -> f64 {
+        self.widths.boundary_m(number)
     }
 
     /// Returns true if the road is straight everywhere, as a road without curvature and without an
@@ -459,13 +506,12 @@ impl Road {
         })
     }
 
-    /// Returns the lateral position of a boundary of the lanes at `s_m` (m). Boundary 0 is the left
-    /// edge of lane 1, and boundary n is the right edge of lane n. The outer boundary of the
-    /// acceleration lane moves inwards where the lane narrows.
+    /// Returns the lateral position of a [boundary](Self::boundary_m) of the lanes at `s_m` (m). The
+    /// outer boundary of the acceleration lane moves inwards where the lane narrows.
     pub fn boundary_at_m(&self, number: u8, s_m: f64) -> f64 {
-        let full_m = -f64::from(number) * self.lane_width_m;
-        let Some(lane) = self.acceleration_lane else { return full_m };
-        let missing_m = || (1.0 - lane.width_share(s_m)) * self.lane_width_m;
+        let full_m = self.boundary_m(number);
+        let (Some(lane), Some(entry)) = (self.acceleration_lane, self.entry_lane()) else { return full_m };
+        let missing_m = || (1.0 - lane.width_share(s_m)) * self.lane_width_m(entry);
         match self.overtaking_side {
             Side::Left if number == self.lanes => full_m + missing_m(),
             Side::Right if number == 0 => full_m - missing_m(),
@@ -487,15 +533,13 @@ impl Road {
 
     /// Returns the lateral position of the centre of a lane (m), which is negative.
     pub fn lane_centre_m(&self, lane: Lane) -> f64 {
-        -(f64::from(lane.0) - 0.5) * self.lane_width_m
+        self.widths.centre_m(lane)
     }
 
     /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that
     /// edge.
     pub fn lane_at(&self, d_m: f64) -> Lane {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=7 before the cast")]
-        let before = (-d_m / self.lane_width_m).clamp(0.0, f64::from(self.lanes) - 1.0) as u8;
-        Lane(before + 1)
+        self.widths.lane_at(self.lanes, d_m)
     }
 
     /// Returns the lane next to `lane` on one side, or `None` if the road has none there.
@@ -520,7 +564,7 @@ impl Road {
 
     /// Returns the lateral position of the right edge of the road (m), which is negative.
     pub fn right_edge_m(&self) -> f64 {
-        -f64::from(self.lanes) * self.lane_width_m
+        self.boundary_m(self.lanes)
     }
 
     /// Returns the pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the
@@ -569,6 +613,11 @@ impl Road {
         let angle = if curvature > 0.0 { maths::atan2(to_x, -to_y) } else { -maths::atan2(to_x, to_y) };
         (angle * radius, radius - maths::hypot(to_x, to_y) * radius.signum())
     }
+}
+
+/// Returns the width of a lane within the range that the models cover (m).
+fn clamped_width_m(width_m: f64) -> f64 {
+    width_m.clamp(Road::LANE_WIDTH_M.low(), Road::LANE_WIDTH_M.high())
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub struct Setting {
 pub struct SetupView {
     /// Time between two steps (s).
     pub control_step_s: f64,
-    /// Width of a lane (m).
+    /// Width of the ego's lane (m).
     pub lane_width_m: f64,
     /// Curvature of the road (1/m), positive to the left; NaN if it changes along the road.
     pub curvature_per_m: f64,
@@ -39,6 +39,8 @@ pub struct SetupView {
     pub setting_count: u64,
     /// The settings as JSON.
     pub settings_json: *const c_char,
+    /// Width of each lane (m), from lane 1 on.
+    pub lane_widths_m: *const f64,
 }
 
 /// The perceived state of another vehicle.
@@ -147,7 +149,7 @@ pub(crate) type TextFunction = unsafe extern "C-unwind" fn() -> *const c_char;
 // The same sizes are asserted in the header.
 #[cfg(target_pointer_width = "64")]
 const _: () = {
-    assert!(size_of::<SetupView>() == 64);
+    assert!(size_of::<SetupView>() == 72);
     assert!(size_of::<Track>() == 272);
     assert!(size_of::<InputView>() == 128);
     assert!(size_of::<Command>() == 16);

@@ -39,7 +39,7 @@ impl EgoController for NativeController {
         input.check_finite()?;
         let front = self.lead.update(input);
         self.input.set(input, front);
-        let setup = || Setup::new(&self.settings, input.road);
+        let setup = || Setup::new(&self.settings, input.road, input.odometry.lane);
         let answer = self.session.step((&self.loaded, &self.table), setup, &self.input);
         let Answer { acceleration_mps2, state } =
             answer.map_err(|reason| ControllerError::Own { reason, time: input.time })?;

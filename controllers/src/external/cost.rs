@@ -17,7 +17,9 @@ fn setup() -> Setup {
         "mis": null,
         "automated": true,
     });
-    Setup { lane_width_m: 3.75, speed_limit_mps: 36.1, lanes: 3, ..Setup::of_settings(&settings) }
+    let lane_width_m = 3.75;
+    let lane_widths_m = vec![lane_width_m; 3];
+    Setup { lane_width_m, lane_widths_m, speed_limit_mps: 36.1, ..Setup::of_settings(&settings) }
 }
 
 /// Returns the mean wall time of a control step with `tracks` tracks (s), over `steps` steps of one

@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, CString};
 
-use closecall_traffic::{CONTROL_STEP, Road, Side, Time};
+use closecall_traffic::{CONTROL_STEP, Lane, Road, Side, Time};
 use serde_json::Value;
 
 use crate::external::abi::{InputView, Setting, SetupView, Track};
@@ -14,14 +14,14 @@ use crate::{EgoInput, EgoSettings, EgoState, Front, Odometry, SensorAvailability
 pub struct Setup {
     /// Time between two control steps (s).
     pub control_step_s: f64,
-    /// Width of a lane (m).
+    /// Width of the ego's lane (m).
     pub lane_width_m: f64,
+    /// Width of each lane (m), from lane 1 on.
+    pub lane_widths_m: Vec<f64>,
     /// Curvature of the road (1/m), positive to the left; NaN if it changes along the road.
     pub curvature_per_m: f64,
     /// Speed limit (m/s).
     pub speed_limit_mps: f64,
-    /// Number of lanes.
-    pub lanes: u32,
     /// The side on which others are overtaken.
     pub overtaking_side: Side,
     pub(crate) settings: Vec<(CString, f64)>,
@@ -29,10 +29,10 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Returns the setup of a controller in this process.
-    pub fn new(settings: &EgoSettings, road: &Road) -> Self {
+    /// Returns the setup of a controller in this process, whose ego is in a lane.
+    pub fn new(settings: &EgoSettings, road: &Road, lane: Lane) -> Self {
         // Serialising structs of numbers and names cannot fail.
-        Self::on_road(&serde_json::to_value(settings).unwrap_or_default(), RoadMessage::of(road))
+        Self::on_road(&serde_json::to_value(settings).unwrap_or_default(), RoadMessage::of(road, lane))
     }
 
     /// Returns a setup with these settings on this road.
@@ -41,7 +41,7 @@ impl Setup {
             lane_width_m: road.lane_width_m,
             curvature_per_m: road.curvature_per_m.unwrap_or(f64::NAN),
             speed_limit_mps: road.speed_limit_mps,
-            lanes: road.lanes.into(),
+            lane_widths_m: road.lane_widths_m,
             overtaking_side: road.overtaking_side,
             ..Self::of_settings(settings)
         }
@@ -55,13 +55,18 @@ impl Setup {
         Self {
             control_step_s: CONTROL_STEP.s(),
             lane_width_m: 0.0,
+            lane_widths_m: Vec::new(),
             curvature_per_m: 0.0,
             speed_limit_mps: 0.0,
-            lanes: 0,
             overtaking_side: Side::Left,
             settings: numbers.into_iter().map(|(name, value)| (text(name), value)).collect(),
             json: text(settings.to_string()),
         }
+    }
+
+    /// Returns the number of lanes.
+    pub fn lanes(&self) -> u32 {
+        u32::try_from(self.lane_widths_m.len()).unwrap_or(u32::MAX)
     }
 
     /// Returns the numbers of the scenario's ego stack with their names, such as `acc.time_gap_s`.
@@ -78,11 +83,12 @@ impl Setup {
             lane_width_m: self.lane_width_m,
             curvature_per_m: self.curvature_per_m,
             speed_limit_mps: self.speed_limit_mps,
-            lanes: self.lanes,
+            lanes: self.lanes(),
             overtaking_side: i32::from(self.overtaking_side == Side::Right),
             settings: settings.as_ptr(),
             setting_count: settings.len() as u64,
             settings_json: CStr::as_ptr(&self.json),
+            lane_widths_m: self.lane_widths_m.as_ptr(),
         })
     }
 }

@@ -1,19 +1,21 @@
 //! The messages to a controller that is a process: the closed loop writes them, and
 //! [`bridge`](super::bridge) reads them. `docs/reference/controllers.md` documents the protocol.
 
-use closecall_traffic::{Road, Side, Source, TrackId, TrackStatus};
+use closecall_traffic::{self as traffic, Road, Side, Source, TrackId, TrackStatus};
 use serde::{Deserialize, Serialize};
 
 use super::abi;
 use crate::{EgoInput, Front, Odometry, SensorAvailability};
 
 /// The road in the first message to a process.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RoadMessage {
     /// Number of lanes.
     pub lanes: u8,
-    /// Width of a lane (m).
+    /// Width of the ego's lane (m).
     pub lane_width_m: f64,
+    /// Width of each lane (m), from lane 1 on.
+    pub lane_widths_m: Vec<f64>,
     /// Curvature (1/m), positive to the left; `None` if it changes along the road.
     pub curvature_per_m: Option<f64>,
     /// Speed limit (m/s).
@@ -23,11 +25,12 @@ pub struct RoadMessage {
 }
 
 impl RoadMessage {
-    /// Returns the message of a road.
-    pub fn of(road: &Road) -> Self {
+    /// Returns the message of a road for an ego in a lane.
+    pub fn of(road: &Road, lane: traffic::Lane) -> Self {
         Self {
             lanes: road.lanes(),
-            lane_width_m: road.lane_width_m(),
+            lane_width_m: road.lane_width_m(lane),
+            lane_widths_m: road.lane_widths_m().collect(),
             curvature_per_m: road.constant_curvature_per_m(),
             speed_limit_mps: road.speed_limit_mps(),
             overtaking_side: road.overtaking_side(),

@@ -1,7 +1,7 @@
 //! What a controller is given. Its classes are documented in `closecall/_native.pyi`.
 
 use closecall_controllers::{EgoInput, EgoSettings, Front, SensorAvailability};
-use closecall_traffic::{Road, Source, Time, TrackStatus};
+use closecall_traffic::{Lane, Road, Source, Time, TrackStatus};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyTuple};
@@ -16,8 +16,8 @@ pub(crate) struct Setup {
 }
 
 impl Setup {
-    pub(super) fn new(settings: &EgoSettings, road: &Road) -> Self {
-        Self { json: setup_json(settings, road) }
+    pub(super) fn new(settings: &EgoSettings, road: &Road, lane: Lane) -> Self {
+        Self { json: setup_json(settings, road, lane) }
     }
 
     fn part<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {

@@ -161,7 +161,7 @@ impl<'a> UsedRoad<'a> {
     }
 
     fn width(&self, section: &Section, lane: Lane) -> Element {
-        let full_m = self.road.lane_width_m();
+        let full_m = self.road.lane_width_m(lane);
         let width = Element::new("width").with("sOffset", 0);
         let width = match self.narrowing_lane().filter(|_| section.is_taper && lane.0 == section.lanes) {
             Some(narrowing) => width
@@ -247,6 +247,19 @@ mod tests {
         // road.
         let first = text.split("<laneSection").nth(1).unwrap();
         assert_eq!(count(first, "sOffset=\"600\" type=\"broken\""), 1, "{first}");
+    }
+
+    #[test]
+    fn each_lane_has_its_own_width() {
+        let road = Road::straight(3).with_lane_widths(&[3.75, 3.25, 3.5]);
+        let widths = |text: &str| -> Vec<String> {
+            let lanes = text.split("<width ").skip(1);
+            lanes.map(|lane| lane.split("a=\"").nth(1).unwrap().split('"').next().unwrap().to_owned()).collect()
+        };
+        assert_eq!(widths(&document(&road, 400.0)), ["3.75", "3.25", "3.5"]);
+        let text = document(&road.with_acceleration_lane(ENTRY), 400.0);
+        assert_eq!(widths(&text), ["3.75", "3.25", "3.5", "3.75", "3.25", "3.5", "3.75", "3.25"]);
+        assert_eq!(count(&text, &format!("a=\"3.5\" b=\"{}\"", -3.5 / 60.0)), 1, "{text}");
     }
 
     #[test]

@@ -93,6 +93,14 @@ fn every_valid_scenario_satisfies_the_schema() {
 }
 
 #[test]
+fn a_width_for_each_lane_satisfies_the_schema() {
+    let text = library::text("low-thw-overtake").unwrap();
+    for widths in ["[3.5, 3.75, 3.25]", "[3.5, \"$cruise-mps\", 3.25]"] {
+        assert_eq!(verdict(&text.replacen("lane-width-m = 3.75", &format!("lane-width-m = {widths}"), 1)), None);
+    }
+}
+
+#[test]
 fn what_check_refuses_the_schema_refuses() {
     let text = library::text("low-thw-overtake").unwrap();
     for (from, to) in [
@@ -101,6 +109,8 @@ fn what_check_refuses_the_schema_refuses() {
         ("duration-s = 60.0", "duraton-s = 60.0"),
         ("friction = 0.9", "friction = 3.0"),
         ("lane-width-m = 3.75", "lane-width-m = -1"),
+        ("lane-width-m = 3.75", "lane-width-m = [3.5, 3.75, 12.0]"),
+        ("lane-width-m = 3.75", "lane-width-m = [3.5, [3.75], 3.5]"),
         ("light = \"day\"", "light = \"noon\""),
         ("class = \"car\"", "class = \"cart\""),
         ("lane = 2", "lane = 0"),

@@ -52,8 +52,60 @@ pub(crate) struct Ground {
     curvature_per_m: f32,
     /// The line of a road with an alignment, which `curvature_per_m` does not describe.
     course: Option<GroundCourse>,
-    lane_width_m: f32,
-    lanes: f32,
+    lanes: GroundLanes,
+}
+
+/// The lanes whose markings are on the ground.
+#[derive(Clone, Copy, Debug)]
+enum GroundLanes {
+    /// Lanes of one width (m).
+    Equal { width_m: f32, lanes: f32 },
+    /// The lateral positions of the markings from the left edge on (m), and the number of the last one.
+    Each { markings_m: [f32; MOST_MARKINGS], last: usize },
+}
+
+/// Largest number of markings along a road.
+const MOST_MARKINGS: usize = 9;
+
+impl GroundLanes {
+    fn new(road: &Road) -> Self {
+        match road.equal_lane_width_m() {
+            Some(width_m) => Self::Equal { width_m: width_m as f32, lanes: f32::from(road.lanes()) },
+            None => {
+                let markings_m =
+                    std::array::from_fn(|number| road.boundary_m(u8::try_from(number).unwrap_or(u8::MAX)) as f32);
+                Self::Each { markings_m, last: road.lanes().into() }
+            }
+        }
+    }
+
+    /// Returns the lateral position of the right edge (m).
+    fn right_m(&self) -> f32 {
+        match self {
+            Self::Equal { width_m, lanes } => -lanes * width_m,
+            Self::Each { markings_m, last } => markings_m[*last],
+        }
+    }
+
+    /// Returns the distance from the nearest marking (m), and whether it is an edge line.
+    fn nearest_marking(&self, d: f32) -> (f32, bool) {
+        match self {
+            Self::Equal { width_m, lanes } => {
+                let line = (split(-d / width_m + 0.5).0 as f32).clamp(0.0, *lanes);
+                ((d + line * width_m).abs(), line == 0.0 || line == *lanes)
+            }
+            Self::Each { markings_m, last } => {
+                let mut nearest = (f32::INFINITY, false);
+                for (number, marking_m) in markings_m[..=*last].iter().enumerate() {
+                    let off = (d - marking_m).abs();
+                    if off < nearest.0 {
+                        nearest = (off, number == 0 || number == *last);
+                    }
+                }
+                nearest
+            }
+        }
+    }
 }
 
 /// A shadow or a headlamp beam that one vehicle casts on the ground.
@@ -126,8 +178,7 @@ impl Ground {
             sin: maths::sin(heading_rad) as f32,
             curvature_per_m: road.constant_curvature_per_m().unwrap_or(f64::NAN) as f32,
             course: road.alignment().map(|_| GroundCourse::new(road, s_m, d_m)),
-            lane_width_m: road.lane_width_m() as f32,
-            lanes: f32::from(road.lanes()),
+            lanes: GroundLanes::new(road),
         }
     }
 
@@ -183,7 +234,7 @@ impl Ground {
     /// Returns the reflectance, and the share of the sky's light that a wet surface mirrors. `run`
     /// is the horizontal distance from the lens (m).
     fn albedo(&self, [s, d]: [f32; 2], run: f32, wetness: f32, noise: &mut GroundNoise) -> (Vec3, f32) {
-        let right = -self.lanes * self.lane_width_m;
+        let right = self.lanes.right_m();
         // The texture fades with distance, as a pixel spans more than one of its cells.
         let detail = 1.0 / (1.0 + run * run / 400.0);
         if d > SHOULDER_M[0] || d < right - SHOULDER_M[1] {
@@ -206,10 +257,8 @@ impl Ground {
 
     /// Returns the share of the surface at this position that is covered by paint (0 to 1).
     fn paint_share(&self, s: f32, d: f32, run: f32) -> f32 {
-        let lanes = -d / self.lane_width_m;
-        let line = (split(lanes + 0.5).0 as f32).clamp(0.0, self.lanes);
-        let off = (d + line * self.lane_width_m).abs();
-        if line == 0.0 || line == self.lanes {
+        let (off, is_edge) = self.lanes.nearest_marking(d);
+        if is_edge {
             return if off < EDGE_LINE_HALF_M { 1.0 } else { 0.0 };
         }
         if off >= LANE_LINE_HALF_M {
@@ -320,6 +369,19 @@ mod tests {
         assert_eq!(ground.paint_share(3.0, -3.75, 10.0), 1.0);
         assert_eq!(ground.paint_share(9.0, -3.75, 10.0), 0.0);
         assert_eq!(ground.paint_share(3.0, -1.9, 10.0), 0.0);
+    }
+
+    #[test]
+    fn the_markings_lie_at_the_edges_of_lanes_of_their_own_widths() {
+        let ground = Ground::new(&Road::straight(3).with_lane_widths(&[3.25, 3.5, 4.0]), 0.0, -5.0, 0.0);
+        for (d, expected) in [(0.0, 1.0), (-3.25, 1.0), (-3.5, 0.0), (-6.75, 1.0), (-7.0, 0.0), (-10.75, 1.0)] {
+            assert_eq!(ground.paint_share(3.0, d, 10.0), expected, "{d}");
+        }
+        // The lane lines are dashed and narrow, the edge lines solid and wide.
+        let between_dashes = [0.0, -3.25, -6.75, -10.75].map(|d| ground.paint_share(9.0, d, 10.0));
+        assert_eq!(between_dashes, [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!([-0.1, -3.35].map(|d| ground.paint_share(3.0, d, 10.0)), [1.0, 0.0]);
+        assert_eq!(ground.lanes.right_m(), -10.75);
     }
 
     #[test]

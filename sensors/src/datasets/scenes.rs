@@ -109,7 +109,7 @@ fn have_clearance(a: &SceneVehicle, b: &SceneVehicle) -> bool {
 fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
     let config = RoadConfig {
         lanes: rng.random_range(2..=4),
-        lane_width_m: Num::Fixed(rng.random_range(3.5..3.8)),
+        lane_width_m: rng.random_range(3.5..3.8).into(),
         curvature_per_m: Num::Fixed(if rng.random_bool(0.5) { rng.random_range(-0.001..0.001) } else { 0.0 }),
         alignment: Vec::new(),
         alignment_d_m: None,

@@ -146,7 +146,7 @@ impl OdometryErrors {
             map = map.with_added_curvature(self.curvature_per_m);
         }
         if self.lane_width_m != 0.0 {
-            map = map.with_lane_width(road.lane_width_m() + self.lane_width_m);
+            map = map.with_added_lane_width(self.lane_width_m);
         }
         if self.has_no_rails { map.without_guard_rails() } else { map }
     }
@@ -154,7 +154,19 @@ impl OdometryErrors {
     /// Returns the lateral position on the map of an ego at `d_m` (m). The ego measures its place
     /// between the markings of its lane.
     pub fn own_d_m(&self, road: &Road, d_m: f64) -> f64 {
-        d_m * (self.map_of(road).lane_width_m() / road.lane_width_m()) + self.lateral_m
+        if self.lane_width_m == 0.0 {
+            return d_m + self.lateral_m;
+        }
+        let map = self.map_of(road);
+        let on_map_m = match [map, *road].map(|road| road.equal_lane_width_m()) {
+            [Some(map_m), Some(width_m)] => d_m * (map_m / width_m),
+            _ => {
+                let lane = road.lane_at(d_m);
+                let scale = map.lane_width_m(lane) / road.lane_width_m(lane);
+                map.lane_centre_m(lane) + (d_m - road.lane_centre_m(lane)) * scale
+            }
+        };
+        on_map_m + self.lateral_m
     }
 }
 

@@ -366,7 +366,7 @@ impl Tracker {
             s_m: ego.s_m + rear_x_m,
             d_m: ego.d_m,
             speed_mps: ego.speed_mps * maths::cos(ego.heading_rad) / frame.path_scale(ego.s_m, ego.d_m),
-            half_lane_m: 0.5 * road.lane_width_m(),
+            half_lane_m: 0.5 * road.lane_width_m(road.lane_at(ego.d_m)),
         }
     }
 

@@ -138,7 +138,8 @@ impl PerceptionProgram for PerceptionProcess {
 /// program. `None` if it cannot be greeted.
 pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Option<(Identity, Vec<PathBuf>)> {
     let model = scenario.sensors.full_model();
-    let size = scenario.actors[scenario.ego].vehicle.dimensions;
+    let ego = &scenario.actors[scenario.ego];
+    let size = ego.vehicle.dimensions;
     let lidars: Vec<LidarMount> = model.rear_lidars().map(|lidar| LidarMount::of(&lidar, size.length_m)).collect();
     let radars: Vec<RadarMount> = model.rear_radar.iter().flat_map(|radar| radar.mounts(size.length_m)).collect();
     let latency_s = model.tracker.latency_steps() as f64 * CONTROL_STEP.s();
@@ -149,6 +150,7 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
     let setup = Setup {
         size,
         road: &scenario.road,
+        lane: scenario.road.lane_at(ego.start.d_m),
         lidars: &lidars,
         radars: &radars,
         camera,

@@ -7,7 +7,7 @@ use closecall_sensors::external::{
     CameraMount, LidarMount, OutsideImage, OutsideRadarScan, OutsideScan, PerceptionQuestion, RadarMount,
 };
 use closecall_sensors::tracking;
-use closecall_traffic::{CONTROL_STEP, Dimensions, Road};
+use closecall_traffic::{CONTROL_STEP, Dimensions, Lane, Road};
 
 use super::message::{Camera, Ego, Hello, Image, Lidar, Message, Odometry, RadarDetection, RadarScan, Scan, Scans};
 use crate::controller::exec::{PROTOCOL, to_line};
@@ -16,6 +16,8 @@ use crate::controller::exec::{PROTOCOL, to_line};
 pub(super) struct Setup<'a> {
     pub(super) size: Dimensions,
     pub(super) road: &'a Road,
+    /// The lane of the ego.
+    pub(super) lane: Lane,
     pub(super) lidars: &'a [LidarMount],
     pub(super) radars: &'a [RadarMount],
     pub(super) camera: Option<CameraMount>,
@@ -27,7 +29,8 @@ impl<'a> Setup<'a> {
     /// Takes the content of the first message from a question.
     pub(super) fn of(question: &PerceptionQuestion<'a>) -> Self {
         let PerceptionQuestion { size, road, lidars, radars, camera, additional_cameras, latency_s, .. } = *question;
-        Self { size, road, lidars, radars, camera, additional_cameras, latency_s }
+        let lane = road.lane_at(question.ego.d_m);
+        Self { size, road, lane, lidars, radars, camera, additional_cameras, latency_s }
     }
 
     /// Returns the first message.
@@ -38,7 +41,7 @@ impl<'a> Setup<'a> {
             control_step_s: CONTROL_STEP.s(),
             latency_s: self.latency_s,
             ego: Ego { length_m: self.size.length_m, width_m: self.size.width_m },
-            road: RoadMessage::of(self.road),
+            road: RoadMessage::of(self.road, self.lane),
             lidars: self.lidars.iter().map(lidar_message).collect(),
             radars: (!self.radars.is_empty()).then(|| self.radars.to_vec()),
             camera: self.camera.as_ref().map(camera_message),

@@ -15,7 +15,7 @@ const SETTLED_LEAD_S: f64 = 1.0;
 pub(crate) struct Widths {
     /// Width of the vehicle (m).
     pub(crate) vehicle_m: f64,
-    /// Width of the lanes (m).
+    /// Width of its lane (m).
     pub(crate) lane_m: f64,
 }
 
@@ -23,7 +23,7 @@ impl CurrentMargins {
     /// Computes the margins of the ego among its neighbours.
     ///
     /// A neighbour counts as being in the lane if the lateral distance of the two centres is below
-    /// half a lane width. An overtaking vehicle thus counts as behind until it crosses the marking,
+    /// half the width of the vehicle's lane. An overtaking vehicle thus counts as behind until it crosses the marking,
     /// and as ahead once it has pulled in. A neighbour that the vehicle would hit by driving
     /// straight on also counts as ahead.
     pub(crate) fn new(ego: &VehicleState, neighbours: &Neighbours, widths: Widths) -> Self {

@@ -132,7 +132,8 @@ impl<'a> Run<'a> {
         if start != placed {
             world = world_with(start);
         }
-        let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
+        let lane_m = scenario.road.lane_width_m(scenario.road.lane_at(world.state(scenario.ego).d_m));
+        let widths = Widths { vehicle_m: 0.0, lane_m };
         let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
         let humans = human_drivers(&scenario, key, &of_arm);
         let mut run = Self {
@@ -417,7 +418,11 @@ impl<'a> Run<'a> {
     }
 
     fn widths(&self, actor: usize) -> Widths {
-        Widths { vehicle_m: self.world.vehicle(actor).dimensions.width_m, lane_m: self.scenario.road.lane_width_m() }
+        let road = &self.scenario.road;
+        Widths {
+            vehicle_m: self.world.vehicle(actor).dimensions.width_m,
+            lane_m: road.lane_width_m(road.lane_at(self.world.state(actor).d_m)),
+        }
     }
 
     /// Reports the control step to the observer.

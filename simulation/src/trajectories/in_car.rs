@@ -128,10 +128,10 @@ impl InCarRecorder {
         let Run { road, start, .. } = self.run;
         let lane = road.lane_at(state.d_m);
         let on_bus = time.is_multiple_of(CONTROL_STEP);
-        let left_edge_m = road.lane_centre_m(lane) + 0.5 * road.lane_width_m();
+        let left_edge_m = road.lane_centre_m(lane) + 0.5 * road.lane_width_m(lane);
         let markings = MarkingDistances {
             left_m: Some(left_edge_m - state.d_m),
-            right_m: Some(state.d_m - left_edge_m + road.lane_width_m()),
+            right_m: Some(state.d_m - left_edge_m + road.lane_width_m(lane)),
         };
         self.frames.push(InCarFrame {
             time: start + time,

@@ -51,7 +51,7 @@ pub(super) struct LaneBand {
 impl LaneBand {
     pub(super) fn new(road: &Road, lane: Lane) -> Self {
         let centre_m = road.lane_centre_m(lane);
-        let half_m = 0.5 * road.lane_width_m() - LANE_OVERLAP_M;
+        let half_m = 0.5 * road.lane_width_m(lane) - LANE_OVERLAP_M;
         Self { right_m: centre_m - half_m, left_m: centre_m + half_m }
     }
 

@@ -407,6 +407,23 @@ mod tests {
     }
 
     #[test]
+    fn a_lane_change_to_a_wider_lane_ends_on_its_centre() {
+        // The car starts on the centre of lane 2.
+        let road = Road::straight(3).with_lane_widths(&[4.0, 3.25, 3.75]);
+        for (target, centre_m) in [(Lane(3), -9.125), (Lane(1), -2.0)] {
+            let mut car = car(30.0);
+            assert!((car.state().d_m - road.lane_centre_m(Lane(2))).abs() < 1e-12);
+            car.change_lane(LaneChange { target, duration_s: 5.0 }, &road);
+            for _ in 0..=500 {
+                car.step(0.0, Indicator::Off, &road);
+            }
+            assert!(car.lane_change_target().is_none());
+            assert!((car.state().d_m - centre_m).abs() < 1e-9, "{:?}", car.state());
+            assert!((road.lane_at(car.state().d_m), car.state().heading_rad.abs() < 1e-9) == (target, true));
+        }
+    }
+
+    #[test]
     fn a_vehicle_follows_its_path_at_any_speed_until_it_changes_lanes() {
         let road = Road::straight(3);
         let points: Vec<[f64; 2]> =

@@ -224,9 +224,12 @@ impl NeighbourSearch {
 /// touches. Two paths with a common point have a common strip, whatever the rounding, because the
 /// index never falls to the right.
 fn strips(road: &Road, [right_m, left_m]: [f64; 2]) -> RangeInclusive<usize> {
-    let last = f64::from(road.lanes()) + 1.0;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before the cast")]
-    let strip = |d_m: f64| (1.0 - d_m / road.lane_width_m()).clamp(0.0, last) as usize;
+    let right_edge_m = road.right_edge_m();
+    let strip = |d_m: f64| match road.lane_at(d_m) {
+        _ if d_m > 0.0 => 0,
+        _ if d_m < right_edge_m => usize::from(road.lanes()) + 1,
+        Lane(lane) => usize::from(lane),
+    };
     strip(left_m + PATH_MARGIN_M)..=strip(right_m - PATH_MARGIN_M)
 }
 
@@ -265,8 +268,9 @@ mod tests {
         #[test]
         fn the_search_finds_what_comparing_all_pairs_finds(
             vehicles in prop::collection::vec(vehicle(), 1..30),
+            widths_m in prop::sample::select(vec![[3.75; 3], [3.0, 3.75, 4.5], [4.5, 2.5, 3.25]]),
         ) {
-            let road = Road::straight(3);
+            let road = Road::straight(3).with_lane_widths(&widths_m);
             let world = world(road, &vehicles);
             let mut neighbours = vec![Neighbours::default(); world.len()];
             let mut search = NeighbourSearch::default();

@@ -19,9 +19,6 @@ const PAINTS: [f64; 4] = [0.1, 0.2, 0.35, 0.8];
 const RAIN_MM_PER_H: [f64; 2] = [10.0, 30.0];
 /// Visibilities in fog (m).
 const FOG_M: [f64; 2] = [200.0, 100.0];
-/// Lateral offset of the neighbouring lane, and of a vehicle that straddles the marking (lane
-/// widths).
-const OFFSETS: [f64; 2] = [1.0, 0.5];
 /// Offset of the car in between in the second case of traffic (m): half of a lane of 3.75 m.
 const ASIDE_M: f64 = 1.9;
 
@@ -150,11 +147,14 @@ pub fn cases(mode: SensorMode, environment: &Environment, road: &Road) -> Result
 fn offsets(usual: &Case, road: &Road) -> impl Iterator<Item = Case> {
     let ego_lane = ego_lane(road);
     let sides = [(1.0, Side::Left, "left"), (-1.0, Side::Right, "right")];
-    let beside = sides.into_iter().filter(move |(_, side, _)| road.beside(ego_lane, *side).is_some());
-    let width_m = road.lane_width_m();
-    beside.flat_map(move |(sign, _, name)| {
-        OFFSETS.map(|offset| {
-            let offset_m = sign * offset * width_m;
+    let own_m = road.lane_width_m(ego_lane);
+    let beside = sides.into_iter().filter_map(move |(sign, side, name)| {
+        let lane = road.beside(ego_lane, side)?;
+        Some((sign, 0.5 * (own_m + road.lane_width_m(lane)), name))
+    });
+    beside.flat_map(move |(sign, lane_m, name)| {
+        [lane_m, 0.5 * own_m].map(|offset_m| {
+            let offset_m = sign * offset_m;
             Case { offset_m, ..usual.varied("offset", format!("{} m to the {name}", offset_m.abs())) }
         })
     })
@@ -175,7 +175,7 @@ fn weathers(usual: &Case) -> impl Iterator<Item = Case> {
 
 /// Returns the lane in which the ego drives: the second from the left, or the only one.
 pub(crate) fn ego_lane(road: &Road) -> Lane {
-    road.lane_at(-1.5 * road.lane_width_m())
+    Lane(road.lanes().min(2))
 }
 
 /// Returns a case for each scenario of the library in which a rear sensor of this mode, the

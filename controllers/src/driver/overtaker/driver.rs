@@ -229,8 +229,10 @@ impl Step<'_> {
     /// marking.
     fn crossing_at(&self, change: &Change) -> f64 {
         let road = self.input.road;
-        let marking_m = 0.5 * (road.lane_centre_m(change.origin) + road.lane_centre_m(change.target));
-        path::longitudinal_share(self.lateral_from_start_m(change, marking_m) / change.lateral_distance_m)
+        let middle_m = 0.5 * (road.lane_centre_m(change.origin) + road.lane_centre_m(change.target));
+        // The marking lies beyond the middle between the centres if the lane of origin is wider.
+        let beyond_m = 0.25 * (road.lane_width_m(change.origin) - road.lane_width_m(change.target));
+        path::longitudinal_share((self.lateral_from_start_m(change, middle_m) + beyond_m) / change.lateral_distance_m)
     }
 
     /// Returns the lateral distance from the start of a change to `d_m`, positive towards its

@@ -92,16 +92,24 @@ const TRACK: &[TrackField] = track_fields![
     "lane_right", "", Real, |track| track.lane[2];
 ];
 
+/// Largest number of lanes of a road.
+const MOST_LANES: usize = 8;
+
 /// Returns the quantities of the setup: name, unit, number, value.
 fn fixed(setup: &Setup) -> Vec<(String, &'static str, Number, f64)> {
     let quantity = |name: &str, unit, number, value| (name.to_owned(), unit, number, value);
     let mut all = vec![
         quantity("control_step", "s", Number::Real, setup.control_step_s),
-        quantity("road_lanes", "", Number::Whole, setup.lanes.into()),
+        quantity("road_lanes", "", Number::Whole, setup.lanes().into()),
         quantity("road_lane_width", "m", Number::Real, setup.lane_width_m),
         quantity("road_curvature", "1/m", Number::Real, setup.curvature_per_m),
         quantity("road_speed_limit", "m/s", Number::Real, setup.speed_limit_mps),
     ];
+    // A lane that the road does not have is 0 m wide.
+    let width_m = |lane: usize| setup.lane_widths_m.get(lane - 1).copied().unwrap_or_default();
+    all.extend(
+        (1..=MOST_LANES).map(|lane| quantity(&format!("road_lane_{lane}_width"), "m", Number::Real, width_m(lane))),
+    );
     // The unit of a setting is the end of its name.
     all.extend(setup.settings().map(|(name, value)| (name.replace('.', "_"), "", Number::Real, value)));
     all
@@ -125,7 +133,14 @@ impl Quantity {
     pub(super) fn names() -> String {
         let step = STEP.iter().map(|field| field.name.to_owned());
         let track = TRACK.iter().map(|field| format!("track_1_{}", field.name));
-        let fixed = ["control_step", "road_lanes", "road_lane_width", "road_curvature", "road_speed_limit"];
+        let fixed = [
+            "control_step",
+            "road_lanes",
+            "road_lane_width",
+            "road_lane_1_width",
+            "road_curvature",
+            "road_speed_limit",
+        ];
         let all =
             step.chain(track).chain(fixed.map(str::to_owned)).chain(["acc_time_gap_s and other settings".to_owned()]);
         all.collect::<Vec<_>>().join(", ")

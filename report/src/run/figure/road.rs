@@ -17,8 +17,7 @@ pub(super) fn road(film: &Film, vehicles: &Markup) -> Markup {
     let right_m = -film.road.right_edge_m() * STRETCH;
     let [rear_m, front_m] = REACH_M;
     let view = format!("{rear_m} {:.1} {} {:.1}", -ROOM_M, front_m - rear_m, right_m + 2.0 * ROOM_M);
-    let lanes = f64::from(film.road.lanes());
-    let lines = (1..film.road.lanes()).map(|line| right_m * f64::from(line) / lanes);
+    let lines = (1..film.road.lanes()).map(|line| -film.road.boundary_m(line) * STRETCH);
     html! {
         svg viewBox=(view) role="img" aria-label={ "The road from above, " (film.arm_label()) } {
             rect x=(rear_m) y="0" width=(front_m - rear_m) height=(format!("{right_m:.1}")) fill="#e9eaec" {}

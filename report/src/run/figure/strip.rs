@@ -1,6 +1,6 @@
 //! A road strip: the road from above at one instant, in a frame that moves with the ego.
 
-use closecall_traffic::{AccelerationLane, Lane, Measured, VehicleState, maths};
+use closecall_traffic::{AccelerationLane, Measured, VehicleState, maths};
 
 use super::chart::tick_text;
 use super::colours::colour;
@@ -113,7 +113,7 @@ impl Strip<'_> {
         let own_m = self.frame.states[self.film.ego].s_m;
         let ends = [own_m + self.reach[0], own_m + self.reach[1]];
         for lane in 1..road.lanes() {
-            let d_m = road.lane_centre_m(Lane(lane)) - 0.5 * road.lane_width_m();
+            let d_m = road.boundary_m(lane);
             let stroke = Stroke { colour: MARKING, width: 1.0, dash: Some(DASH) };
             svg.line(self.at(ends[0], d_m), self.at(ends[1], d_m), stroke);
         }

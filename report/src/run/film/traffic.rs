@@ -235,7 +235,7 @@ fn road(recording: &SmoothedTrajectoryData, tracks: &[&Trajectory]) -> Result<Ro
 pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, ConfigError> {
     let config = RoadConfig {
         lanes,
-        lane_width_m: Num::Fixed(lane_width_m.clamp(LANE_WIDTH_RANGE_M[0], LANE_WIDTH_RANGE_M[1])),
+        lane_width_m: lane_width_m.clamp(LANE_WIDTH_RANGE_M[0], LANE_WIDTH_RANGE_M[1]).into(),
         curvature_per_m: Num::Fixed(0.0),
         alignment: Vec::new(),
         alignment_d_m: None,

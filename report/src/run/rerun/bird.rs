@@ -16,7 +16,7 @@
 
 mod names;
 
-use closecall_traffic::{Indicator, Lane, Measured, Source, Time, Track, TrackStatus, maths};
+use closecall_traffic::{Indicator, Measured, Source, Time, Track, TrackStatus, maths};
 use rerun::{LineStrips2D, Points2D};
 
 use super::RecordingError;
@@ -181,10 +181,7 @@ pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
 /// Writes the edges of the road and the lane markings.
 fn write_lanes(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
     let road = &canvas.film.road;
-    let lines = (0..=road.lanes()).map(|line| match line {
-        0 => 0.0,
-        line => road.lane_centre_m(Lane(line)) - 0.5 * road.lane_width_m(),
-    });
+    let lines = (0..=road.lanes()).map(|line| road.boundary_m(line));
     // A drawing of wide roads shows more than the stretch that is meant.
     let strips = lines.map(|d_m| {
         let y = (canvas.top_m - d_m * STRETCH) as f32;

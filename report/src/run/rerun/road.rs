@@ -1,6 +1,6 @@
 //! The road in the 3D scene: surface, lane markings, guard rails. It is written once per film.
 
-use closecall_traffic::{AccelerationLane, Lane, Road, Side};
+use closecall_traffic::{AccelerationLane, Road, Side};
 use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordingError;
@@ -79,7 +79,7 @@ fn markings(road: &Road, [from_m, to_m]: [f64; 2]) -> Ribbons<'_> {
         }
     }
     for lane in 1..road.lanes() {
-        let line_m = road.lane_centre_m(Lane(lane)) - 0.5 * road.lane_width_m();
+        let line_m = road.boundary_m(lane);
         for dash in multiples(DASH_PERIOD_M, [from_m, to_m]) {
             markings.add([dash, dash + DASH_M], around(line_m, DASH_WIDTH_M));
         }

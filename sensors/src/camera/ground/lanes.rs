@@ -5,8 +5,8 @@ use wide::f32x4;
 
 use super::{
     ASPHALT, ASPHALT_KEY, BEAM_M, CONTACT_SHADOW_M, DARKEST, DASH_EVERY_M, DASH_M, DASHES_MERGE_M, EDGE_LINE_HALF_M,
-    GRAIN_TO_M, GRASS, GRASS_KEY, Ground, GroundLight, LANE_LINE_HALF_M, LEAST_SUN, LONGEST_SHADOW_M, PAINT, Patch,
-    PatchKind, SHOULDER_M,
+    GRAIN_TO_M, GRASS, GRASS_KEY, Ground, GroundLanes, GroundLight, LANE_LINE_HALF_M, LEAST_SUN, LONGEST_SHADOW_M,
+    PAINT, Patch, PatchKind, SHOULDER_M,
 };
 use crate::camera::lanes::{PlaneNoise, Radiance, none, split};
 use crate::camera::light::Illumination;
@@ -120,7 +120,7 @@ impl Ground {
         wetness: f32,
         noise: &mut GroundNoise,
     ) -> Option<(Radiance, f32x4)> {
-        let right = -self.lanes * self.lane_width_m;
+        let right = self.lanes.right_m();
         let is_beside = d.simd_gt(splat(SHOULDER_M[0])) | d.simd_lt(splat(right - SHOULDER_M[1]));
         if is_beside.all() {
             let texture = noise.grass.at(GRASS_KEY, splat(0.7) * s, splat(1.3) * d);
@@ -148,19 +148,43 @@ impl Ground {
     #[inline]
     fn paint_shares(&self, s: f32x4, d: f32x4, row: &GroundRow) -> f32x4 {
         let [none_of_it, whole] = [splat(0.0), splat(1.0)];
-        let line = split(-d / splat(self.lane_width_m) + splat(0.5)).0.round_float();
-        let line = line.max(none_of_it).min(splat(self.lanes));
-        let off = (d + line * splat(self.lane_width_m)).abs();
+        let (off, is_edge) = self.lanes.nearest_markings(d);
         let is_near = off.simd_lt(splat(EDGE_LINE_HALF_M));
         if none(is_near) {
             return none_of_it;
         }
-        let is_edge = line.simd_eq(none_of_it) | line.simd_eq(splat(self.lanes));
         let phase = split(s / splat(DASH_EVERY_M)).1 * splat(DASH_EVERY_M);
         let dash = phase.simd_lt(splat(DASH_M)).select(whole, none_of_it);
         let dashes = dash + (splat(DASH_M / DASH_EVERY_M) - dash) * row.merged;
         let of_lane = off.simd_ge(splat(LANE_LINE_HALF_M)).select(none_of_it, dashes);
         is_edge.select(is_near.select(whole, none_of_it), of_lane)
+    }
+}
+
+impl GroundLanes {
+    /// See [`GroundLanes::nearest_marking`].
+    #[inline]
+    fn nearest_markings(&self, d: f32x4) -> (f32x4, f32x4) {
+        match self {
+            Self::Equal { width_m, lanes } => {
+                let (first, last) = (splat(0.0), splat(*lanes));
+                let line = split(-d / splat(*width_m) + splat(0.5)).0.round_float();
+                let line = line.max(first).min(last);
+                let off = (d + line * splat(*width_m)).abs();
+                (off, line.simd_eq(first) | line.simd_eq(last))
+            }
+            Self::Each { markings_m, last } => {
+                let [no, yes] = [splat(0.0), splat(0.0).simd_eq(splat(0.0))];
+                let mut nearest = (splat(f32::INFINITY), no);
+                for (number, marking_m) in markings_m[..=*last].iter().enumerate() {
+                    let off = (d - splat(*marking_m)).abs();
+                    let is_nearer = off.simd_lt(nearest.0);
+                    let is_edge = if number == 0 || number == *last { yes } else { no };
+                    nearest = (is_nearer.select(off, nearest.0), is_nearer.select(is_edge, nearest.1));
+                }
+                nearest
+            }
+        }
     }
 }
 
@@ -223,4 +247,31 @@ fn headlamp_beam(ahead: f32x4, left: f32x4) -> f32x4 {
     }
     let along = (one - ahead / far) * (one - ahead / far) * ahead / (ahead + splat(3.0));
     is_lit.select(along * across * across, zero)
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::Road;
+
+    use super::*;
+
+    #[test]
+    fn the_markings_at_four_moments_are_the_markings_at_each() {
+        for widths_m in [&[3.75, 3.75, 3.75][..], &[3.25, 3.5, 4.0], &[2.5, 5.0]] {
+            let lanes = GroundLanes::new(&Road::straight(1).with_lane_widths(widths_m));
+            for index in 0..300_u16 {
+                let d: [f32; 4] = std::array::from_fn(|moment| 2.0 - 0.05 * f32::from(index) - 0.013 * moment as f32);
+                let (off, is_edge) = lanes.nearest_markings(d.into());
+                let is_edge = is_edge.select(splat(1.0), splat(0.0)).to_array();
+                for (moment, d) in d.into_iter().enumerate() {
+                    let (expected, at_edge) = lanes.nearest_marking(d);
+                    assert_eq!(
+                        (off.to_array()[moment], is_edge[moment] == 1.0),
+                        (expected, at_edge),
+                        "{widths_m:?} {d}"
+                    );
+                }
+            }
+        }
+    }
 }

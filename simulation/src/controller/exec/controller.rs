@@ -6,7 +6,7 @@ use std::time::Duration;
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, LeadVehicleSelector, Reason,
 };
-use closecall_traffic::{Road, Time};
+use closecall_traffic::{Lane, Road, Time};
 
 use super::child::Child;
 use super::error::ExecError;
@@ -48,8 +48,9 @@ impl ExecFactory {
     }
 }
 
-/// Starts a process in the given folder, or in the folder of this program, and greets it. Returns
-/// the statements in its first answer, and the files that it has open.
+/// Starts a process in the given folder, or in the folder of this program, and greets it with the
+/// road and the lane of the ego. Returns the statements in its first answer, and the files that it
+/// has open.
 ///
 /// # Errors
 /// [`ExecError`] if the process cannot be started, or does not give a valid first answer.
@@ -57,9 +58,9 @@ pub fn identify(
     settings: &ExecSettings,
     folder: Option<&Path>,
     ego_settings: &EgoSettings,
-    road: &Road,
+    (road, lane): (&Road, Lane),
 ) -> Result<(Identity, Vec<PathBuf>), ExecError> {
-    greet(settings, folder, ego_settings, road).map(|(child, identity)| (identity, child.open_files()))
+    greet(settings, folder, ego_settings, (road, lane)).map(|(child, identity)| (identity, child.open_files()))
 }
 
 /// Starts a process, and greets it.
@@ -67,11 +68,11 @@ fn greet(
     settings: &ExecSettings,
     folder: Option<&Path>,
     ego_settings: &EgoSettings,
-    road: &Road,
+    (road, lane): (&Road, Lane),
 ) -> Result<(Child, Identity), ExecError> {
     let mut child = Child::start(settings, folder)?;
     let timeout = START_TIMEOUT.max(settings.timeout());
-    let hello = child.request(protocol::hello(ego_settings, road), timeout)?;
+    let hello = child.request(protocol::hello(ego_settings, road, lane), timeout)?;
     let identity = protocol::check_hello(&hello)?;
     Ok((child, identity))
 }
@@ -120,7 +121,8 @@ impl ExecController {
         let child = match &mut self.child {
             Some(child) => child,
             None => {
-                let (child, _) = greet(&self.settings, self.folder.as_deref(), &self.ego_settings, input.road)?;
+                let place = (input.road, input.odometry.lane);
+                let (child, _) = greet(&self.settings, self.folder.as_deref(), &self.ego_settings, place)?;
                 self.child.insert(child)
             }
         };

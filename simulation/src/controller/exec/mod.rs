@@ -22,8 +22,8 @@
 //! 1. Closecall sends
 //!    `{"type":"hello","protocol":1,"control_step_s":0.04,"settings":{…},"road":{…}}`. `settings`
 //!    are the settings of the scenario's `ego-stack` (`acc`, `aeb`, `mis`, `automated`; `null` if
-//!    absent), `road` has `lanes`, `lane_width_m`, `curvature_per_m`, `speed_limit_mps` and
-//!    `overtaking_side`.
+//!    absent), `road` has `lanes`, `lane_width_m` (of the ego's lane), `lane_widths_m` (of each lane,
+//!    from lane 1 on), `curvature_per_m`, `speed_limit_mps` and `overtaking_side`.
 //! 2. The process answers `{"type":"hello","protocol":1}` within 10 s, or within the timeout of 4.
 //!    if that is longer. The answer may have `name` and `version`, which a campaign keeps: it is
 //!    not resumed with a process that states others.

@@ -3,7 +3,7 @@
 use closecall_controllers::external::bridge::ERROR_KEY;
 use closecall_controllers::external::{Identity, RoadMessage, StepMessage};
 use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front};
-use closecall_traffic::{CONTROL_STEP, Road};
+use closecall_traffic::{CONTROL_STEP, Lane, Road};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -33,9 +33,9 @@ enum Message<'a> {
 /// The mark by which some runtimes begin a text: U+FEFF in UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Returns the first message.
-pub(super) fn hello(settings: &EgoSettings, road: &Road) -> Vec<u8> {
-    let road = RoadMessage::of(road);
+/// Returns the first message to the process of an ego in a lane.
+pub(super) fn hello(settings: &EgoSettings, road: &Road, lane: Lane) -> Vec<u8> {
+    let road = RoadMessage::of(road, lane);
     to_line(&Message::Hello { protocol: PROTOCOL, control_step_s: CONTROL_STEP.s(), settings, road })
 }
 

@@ -76,6 +76,7 @@ pub(super) struct SetupView {
     pub(super) camera: *const Camera,
     pub(super) additional_cameras: *const Camera,
     pub(super) additional_camera_count: u64,
+    pub(super) lane_widths_m: *const f64,
 }
 
 /// A scan of a LiDAR.
@@ -205,7 +206,7 @@ const _: () = {
     assert!(size_of::<Lidar>() == 72);
     assert!(size_of::<Radar>() == 80);
     assert!(size_of::<Camera>() == 88);
-    assert!(size_of::<SetupView>() == 120);
+    assert!(size_of::<SetupView>() == 128);
     assert!(size_of::<Scan>() == 80);
     assert!(size_of::<RadarDetection>() == 24);
     assert!(size_of::<RadarScan>() == 32);

@@ -84,7 +84,7 @@ impl Setup {
             lane_width_m: road.lane_width_m,
             curvature_per_m: road.curvature_per_m.unwrap_or(f64::NAN),
             speed_limit_mps: road.speed_limit_mps,
-            lanes: road.lanes.into(),
+            lanes: whole(road.lane_widths_m.len()),
             overtaking_side: number_of(road.overtaking_side),
             lidars: lidar_list.as_ptr(),
             lidar_count: lidar_list.len() as u64,
@@ -93,6 +93,7 @@ impl Setup {
             camera: cameras.first().map_or(std::ptr::null(), std::ptr::from_ref),
             additional_cameras: additional.as_ptr(),
             additional_camera_count: additional.len() as u64,
+            lane_widths_m: road.lane_widths_m.as_ptr(),
         })
     }
 

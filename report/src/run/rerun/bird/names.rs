@@ -52,6 +52,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let film = canvas.film;
     let frame = &film.frames[row];
     let ego = &frame.states[film.ego];
+    let own_lane_m = film.road.lane_width_m(film.road.lane_at(ego.d_m));
     let labelled_m = canvas.labelled_m();
     // A headway after a collision says nothing, and its room is taken by the text of the collision.
     let has_collided = film.worst_collision().is_some_and(|collision| frame.time >= collision.time);
@@ -75,7 +76,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
             let is_inside = x_m > labelled_m[0] && x_m < labelled_m[1];
             let is_shown = is_inside || is_neighbour(frame, actor);
             let label = format!("{}{}", arrow(x_m, labelled_m), film.vehicle_label(actor));
-            let is_above = actor != film.ego && (x_m < 0.0 || state.d_m - ego.d_m > 0.5 * film.road.lane_width_m());
+            let is_above = actor != film.ego && (x_m < 0.0 || state.d_m - ego.d_m > 0.5 * own_lane_m);
             let headway = if has_collided { String::new() } else { headway_of(frame, actor) };
             let moving = format!("{label} {:.1} m/s", state.speed_mps);
             let text = format!("{moving}{headway}");
