@@ -50,6 +50,7 @@ mod hidden_lead;
 mod inputs;
 mod inspect;
 mod instruction_sets;
+mod lane_widths;
 mod library;
 mod library_faults;
 mod looking;

@@ -548,8 +548,8 @@ fn scenario_text(
             ));
         }
         let speed_mps = speeds.first().map_or(start.speed_mps, |(_, mps)| *mps);
-        let lane = road.lanes.iter().position(|lane| *lane == start.lane).unwrap_or_default() + 1;
-        let centre_m = -(lane as f64 - 0.5) * road.lane_width_m;
+        let lane_index = road.index(start.lane).unwrap_or_default();
+        let (lane, centre_m) = (lane_index + 1, road.centre_m(lane_index));
         let mass =
             start.mass_kg.filter(|mass| *mass > 0.0).map(|mass| format!(", mass-kg = {mass:?}")).unwrap_or_default();
         let _ = write!(
@@ -628,13 +628,16 @@ fn scenario_text(
             format!("alignment = [{}]{beside}", points.join(", "))
         }
     };
+    let width = match &road.widths_m[..] {
+        [first_m, others_m @ ..] if others_m.iter().all(|width_m| width_m == first_m) => format!("{first_m:?}"),
+        widths_m => format!("{widths_m:?}"),
+    };
     let _ = write!(
         text,
         "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
-         road = {{ lanes = {}, lane-width-m = {:?}, {course}{}{}{} }}\n",
+         road = {{ lanes = {}, lane-width-m = {width}, {course}{}{}{} }}\n",
         kebab(&stem),
         road.lanes.len(),
-        road.lane_width_m,
         limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),
         if road.is_left_hand { ", overtaking-side = \"right\"" } else { "" },
         acceleration_lane.unwrap_or_default(),

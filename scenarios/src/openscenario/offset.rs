@@ -20,7 +20,6 @@
 use std::f64::consts::PI;
 
 use super::dom::{ImportError, Node};
-use super::plane::nearest;
 use super::reader::is_true;
 use super::shift::Shift;
 use super::storyboard::{STEP_S, Storyboard};
@@ -34,14 +33,19 @@ const LEAST_STEP_M: f64 = 0.5;
 /// same path.
 const SECOND_POINT_M: f64 = 10.0;
 impl Storyboard<'_> {
+    /// Returns half the width of a lane (m); 0 if the road does not have it.
+    fn half_width_m(&self, lane: i32) -> f64 {
+        self.road.index(lane).map_or(0.0, |index| self.road.half_width_m(index))
+    }
+
     /// Checks that a place beside the centre of a lane (m) is within the lane.
-    pub(super) fn check_offset(&self, node: &Node, name: &str, offset_m: f64) -> Result<(), ImportError> {
-        let most_m = 0.5 * self.road.lane_width_m;
+    fn check_offset(&self, node: &Node, lane: i32, offset_m: f64) -> Result<(), ImportError> {
+        let most_m = self.half_width_m(lane);
         match offset_m.abs() <= most_m {
             true => Ok(()),
             false => {
                 let message = format!(
-                    "`{name}` leads {offset_m} m beside the centre of the lane; -{most_m} to {most_m} m, half the width of \
+                    "`value` leads {offset_m} m beside the centre of the lane; -{most_m} to {most_m} m, half the width of \
                      the lane, are possible"
                 );
                 Err(self.reader.error(node, message))
@@ -55,24 +59,25 @@ impl Storyboard<'_> {
     /// # Errors
     /// [`ImportError`] if it lies beside the driving lanes.
     pub(super) fn lane_beside(&self, node: &Node, lane: i32, offset_m: f64) -> Result<(i32, f64), ImportError> {
-        let most_m = 0.5 * self.road.lane_width_m;
-        if offset_m.abs() <= most_m {
+        if offset_m.abs() <= self.half_width_m(lane) {
             return Ok((lane, offset_m));
         }
         let centres_m = &self.road.centres_m;
-        let index = self.road.lanes.iter().position(|other| *other == lane);
+        let index = self.road.index(lane);
         let Some(from_m) = index.and_then(|index| centres_m.get(index)).copied() else {
             return Err(self.reader.error(node, "the road has no lane"));
         };
         let place_m = from_m + offset_m;
-        if let Some(index) = nearest(centres_m, place_m)
-            && (place_m - centres_m[index]).abs() <= most_m
+        if let Some(index) = self.road.lane_near(place_m)
+            && (place_m - centres_m[index]).abs() <= self.road.half_width_m(index)
         {
             return Ok((self.road.lanes[index], place_m - centres_m[index]));
         }
-        let reach_m =
-            |(low, high): (f64, f64), centre_m: f64| (low.min(centre_m - most_m), high.max(centre_m + most_m));
-        let (low_m, high_m) = centres_m.iter().copied().fold((f64::INFINITY, f64::NEG_INFINITY), reach_m);
+        let reach_m = |(low, high): (f64, f64), (index, centre_m): (usize, &f64)| {
+            let half_m = self.road.half_width_m(index);
+            (low.min(centre_m - half_m), high.max(centre_m + half_m))
+        };
+        let (low_m, high_m) = centres_m.iter().enumerate().fold((f64::INFINITY, f64::NEG_INFINITY), reach_m);
         let message = format!(
             "`offset` leads {offset_m} m beside the centre of lane {lane}; the driving lanes reach from {:.2} to {:.2} m \
              beside it",
@@ -106,7 +111,7 @@ impl Storyboard<'_> {
             "RelativeTargetLaneOffset" => self.vehicle(target, "entityRef")?.offset_m + value_m,
             _ => return Err(reader.error(target, "this target is not read")),
         };
-        self.check_offset(target, "value", to_m)?;
+        self.check_offset(target, self.vehicles[vehicle].lane, to_m)?;
         let dynamics = reader.child(node, &["LaneOffsetActionDynamics"])?;
         let is_cubic = reader.text(dynamics, "dynamicsShape")? == "cubic";
         let largest_mps2 = reader.number(dynamics, "maxLateralAcc")?;

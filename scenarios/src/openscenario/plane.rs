@@ -65,11 +65,6 @@ impl ReferenceLine {
     }
 }
 
-/// Returns the index of the lane whose centre is nearest.
-pub(super) fn nearest(centres_m: &[f64], t_m: f64) -> Option<usize> {
-    (0..centres_m.len()).min_by(|a, b| (centres_m[*a] - t_m).abs().total_cmp(&(centres_m[*b] - t_m).abs()))
-}
-
 #[cfg(test)]
 mod tests {
     use closecall_traffic::{Alignment, AlignmentPoint};

@@ -22,6 +22,10 @@ const MOST_SPEED_LIMIT_MPS: f64 = 100.0;
 /// numbers of at least 0: some programs write -1, which has no meaning there.
 const NO_LIMIT: [&str; 2] = ["no limit", "undefined"];
 
+/// Largest distance between two lanes that lie beside each other (m): the numbers of a file are
+/// rounded.
+const MOST_GAP_M: f64 = 0.01;
+
 /// The part of a file's road that a scenario can use.
 #[derive(Clone, Debug)]
 pub(super) struct ImportedRoad {
@@ -33,7 +37,8 @@ pub(super) struct ImportedRoad {
     pub(super) lanes: Vec<i32>,
     /// The centres of these lanes, to the left of the reference line (m).
     pub(super) centres_m: Vec<f64>,
-    pub(super) lane_width_m: f64,
+    /// The widths of these lanes (m).
+    pub(super) widths_m: Vec<f64>,
     pub(super) curvature_per_m: f64,
     /// The course of a road whose curvature changes, or whose lanes lie beside its reference line.
     pub(super) alignment: Option<Alignment>,
@@ -48,6 +53,30 @@ pub(super) struct ImportedRoad {
     pub(super) speed_limit_mps: Option<f64>,
     /// The properties that the scenario's road lacks.
     pub(super) notes: Vec<String>,
+}
+
+impl ImportedRoad {
+    /// Returns the index of a lane of OpenDRIVE, from the left.
+    pub(super) fn index(&self, lane: i32) -> Option<usize> {
+        self.lanes.iter().position(|other| *other == lane)
+    }
+
+    /// Returns half the width of the lane with an index (m).
+    pub(super) fn half_width_m(&self, index: usize) -> f64 {
+        0.5 * self.widths_m.get(index).copied().unwrap_or_default()
+    }
+
+    /// Returns the lateral position in the scenario of the centre of the lane with an index (m).
+    pub(super) fn centre_m(&self, index: usize) -> f64 {
+        -(self.widths_m.iter().take(index).sum::<f64>() + self.half_width_m(index))
+    }
+
+    /// Returns the index of the lane in which a place to the left of the reference line (m) lies, or
+    /// to whose edge it is nearest.
+    pub(super) fn lane_near(&self, t_m: f64) -> Option<usize> {
+        let beyond_m = |index: usize| (self.centres_m[index] - t_m).abs() - self.half_width_m(index);
+        (0..self.centres_m.len()).min_by(|a, b| beyond_m(*a).total_cmp(&beyond_m(*b)))
+    }
 }
 
 /// The road that a scenario uses.
@@ -65,6 +94,23 @@ pub(super) enum UsedRoad<'a> {
 struct DrivingLane {
     id: i32,
     width_m: f64,
+}
+
+impl DrivingLane {
+    /// Returns the width of the lane in the scenario (m). A width at `s_m` that no lane of a scenario
+    /// has becomes the width of the ego's lane, with a note.
+    fn width_in_scenario_m(&self, own: Self, s_m: f64, notes: &mut Vec<String>) -> f64 {
+        let Self { id, width_m } = *self;
+        if Road::LANE_WIDTH_M.contains(width_m) {
+            return width_m;
+        }
+        let allowed = "a lane of a scenario has a width of 2.5 to 5 m";
+        let own_m = own.width_m;
+        notes.push(format!(
+            "lane {id} with a width of {width_m} m at {s_m} m, and {allowed}: it has the {own_m} m of the ego's lane"
+        ));
+        own_m
+    }
 }
 
 /// A place along a road.
@@ -201,7 +247,6 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     driving.extend(later_entry.map(|entry| DrivingLane { id: entry.id, width_m: entry.width_m }));
     driving.sort_by_key(|lane| std::cmp::Reverse(lane.id));
     let used_lane = used_lane(path, along, &driving, used)?;
-    let lane_width_m = used_lane.width_m;
     if !LANES.contains(&driving.len()) {
         let message = format!("it has {} driving lanes; a scenario has 1 to 8", driving.len());
         return Err(along.error(path, message));
@@ -209,9 +254,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     if along.all("lane").any(changes_width) {
         notes.push(format!("lanes whose width changes: each has the width at {s_m} m"));
     }
-    if driving.iter().any(|lane| lane.width_m != lane_width_m) {
-        notes.push(format!("lanes of other widths: all have the {lane_width_m} m of the ego's lane"));
-    }
+    let widths_m: Vec<f64> = driving.iter().map(|lane| lane.width_in_scenario_m(used_lane, s_m, &mut notes)).collect();
     if changes(lanes, "laneOffset") {
         notes.push(format!("a lane offset that changes: the lanes have the offset at {s_m} m"));
     }
@@ -225,10 +268,11 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
             _ => {}
         }
     }
-    // The lane of the ego keeps its place, also if other lanes have other widths.
+    note_gaps(&driving, &centres_m, &mut notes);
+    // The lane of the ego keeps its place, also if others are elsewhere in the file.
     let used_index = driving.iter().position(|lane| lane.id == used_lane.id).unwrap_or_default();
     let centre_m = centres_m.get(used_index).copied().unwrap_or_default();
-    let left_edge_m = centre_m + (used_index as f64 + 0.5) * lane_width_m;
+    let left_edge_m = centre_m + widths_m.iter().take(used_index).sum::<f64>() + 0.5 * used_lane.width_m;
     let alignment_d_m = (-left_edge_m * 1e9).round() / 1e9 + 0.0;
     let (curvature_per_m, alignment) = curvature(path, road, alignment_d_m, &mut notes)?;
     let lanes = driving.iter().map(|lane| lane.id).collect();
@@ -239,7 +283,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         length_m,
         lanes,
         centres_m,
-        lane_width_m,
+        widths_m,
         curvature_per_m,
         alignment,
         alignment_d_m,
@@ -299,6 +343,17 @@ fn centres_m(lanes: &Node, along: &Node, driving: &[DrivingLane], place: Place) 
     centres_m.sort_by_key(|(id, _)| std::cmp::Reverse(*id));
     centres_m.dedup_by_key(|(id, _)| *id);
     centres_m.into_iter().map(|(_, centre_m)| centre_m).collect()
+}
+
+/// Notes driving lanes that do not lie beside each other, as between a lane for another use.
+fn note_gaps(driving: &[DrivingLane], centres_m: &[f64], notes: &mut Vec<String>) {
+    for (lanes, centres_m) in driving.windows(2).zip(centres_m.windows(2)) {
+        let gap_m = centres_m[0] - centres_m[1] - 0.5 * (lanes[0].width_m + lanes[1].width_m);
+        if gap_m.abs() > MOST_GAP_M {
+            let [left, right] = [lanes[0].id, lanes[1].id];
+            notes.push(format!("{gap_m:.2} m between its lanes {left} and {right}: they lie beside each other here"));
+        }
+    }
 }
 
 /// Returns the reference line of a road of a length (m) in the plane, or `None` if it is not the
@@ -424,10 +479,15 @@ mod tests {
     use super::*;
 
     fn road(rule: &str, side: &str, sign: &str) -> Result<ImportedRoad, String> {
+        road_with([3.5, 3.5], rule, side, sign)
+    }
+
+    /// A road with two driving lanes of these widths beside a median.
+    fn road_with(widths_m: [f64; 2], rule: &str, side: &str, sign: &str) -> Result<ImportedRoad, String> {
         let lane = |number: u32, kind: &str, width_m: f64| {
             format!("<lane id=\"{sign}{number}\" type=\"{kind}\"><width a=\"{width_m}\"/></lane>")
         };
-        let lanes = [lane(1, "median", 2.0), lane(2, "driving", 3.5), lane(3, "driving", 3.5)].concat();
+        let lanes = [lane(1, "median", 2.0), lane(2, "driving", widths_m[0]), lane(3, "driving", widths_m[1])].concat();
         let text = format!(
             "<OpenDRIVE><road id=\"7\" length=\"900\" rule=\"{rule}\"><planView><geometry x=\"0\" y=\"0\" hdg=\"0\" \
              length=\"900\"><line/></geometry></planView><lanes><laneOffset a=\"1\"/><laneSection><{side}>{lanes}</{side}>\
@@ -459,6 +519,46 @@ mod tests {
             let message = limit(wrong).unwrap_err();
             assert!(message.contains(word), "{message}");
         }
+    }
+
+    #[test]
+    fn each_lane_has_its_own_width_and_lies_beside_the_others() {
+        let right = road_with([3.25, 4.0], "RHT", "right", "-").unwrap();
+        assert_eq!(
+            (&right.widths_m[..], &right.centres_m[..], right.notes.len()),
+            (&[3.25, 4.0][..], &[-2.625, -6.25][..], 0)
+        );
+        assert_eq!([0, 1].map(|index| right.centre_m(index)), [-1.625, -5.25]);
+        assert_eq!(right.alignment_d_m, 1.0);
+        // A place belongs to the lane between whose edges it lies, though another centre may be nearer.
+        let near = [-0.9, -4.2, -4.3, -4.5, -99.0].map(|t_m| right.lane_near(t_m));
+        assert_eq!(near, [Some(0), Some(0), Some(1), Some(1), Some(1)]);
+        // With left-hand traffic, the lane with the greatest number is the leftmost.
+        let left = road_with([3.25, 4.0], "LHT", "left", "").unwrap();
+        assert_eq!((&left.lanes[..], &left.widths_m[..]), (&[3, 2][..], &[4.0, 3.25][..]));
+        assert_eq!(left.alignment_d_m, -10.25);
+    }
+
+    #[test]
+    fn a_width_that_no_lane_of_a_scenario_has_becomes_the_ego_s_with_a_note() {
+        let wide = road_with([3.5, 6.0], "RHT", "right", "-").unwrap();
+        assert_eq!(wide.widths_m, [3.5, 3.5]);
+        let note = "lane -3 with a width of 6 m at 0 m, and a lane of a scenario has a width of 2.5 to 5 m: \
+                    it has the 3.5 m of the ego's lane";
+        assert_eq!(wide.notes, [note]);
+    }
+
+    #[test]
+    fn a_lane_for_another_use_between_driving_lanes_is_noted() {
+        let lanes = [(-1, "driving"), (-2, "biking"), (-3, "driving")]
+            .map(|(id, kind)| format!("<lane id=\"{id}\" type=\"{kind}\"><width a=\"3\"/></lane>"));
+        let text = format!(
+            "<OpenDRIVE><road id=\"7\" length=\"900\"><planView><geometry x=\"0\" y=\"0\" hdg=\"0\" length=\"900\">\
+             <line/></geometry></planView><lanes><laneSection><right>{}</right></laneSection></lanes></road></OpenDRIVE>",
+            lanes.concat()
+        );
+        let road = read(Path::new("road.xodr"), &text, &UsedRoad::Only).unwrap();
+        assert_eq!(road.notes, ["3.00 m between its lanes -1 and -3: they lie beside each other here"]);
     }
 
     #[test]

@@ -10,7 +10,6 @@ use std::f64::consts::PI;
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
 use super::follow::Following;
-use super::plane::nearest;
 use super::reader::{Reader, is_true};
 use super::road::ImportedRoad;
 use super::shift::Shift;
@@ -302,7 +301,7 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    /// Ends the manoeuvres and the events of an act. Those of other acts go on.
+    /// Ends the manoeuvres and the events of an act. Other acts go on.
     fn stop_act(&mut self, act: &Node) {
         let maneuvers: Vec<&Node> = act.all("ManeuverGroup").flat_map(|group| group.all("Maneuver")).collect();
         self.end_events(|running| maneuvers.iter().any(|maneuver| maneuver.id == running.maneuver));
@@ -660,7 +659,8 @@ impl<'a> Storyboard<'a> {
                 .error(target, format!("from lane {from} to lane {to}: only the next lane is read")));
         }
         let dynamics = self.reader.child(node, &["LaneChangeActionDynamics"])?;
-        let (duration_s, _) = self.transition(dynamics, 0.0, self.road.lane_width_m, self.vehicles[actor].speed_mps)?;
+        let way_m = self.road.half_width_m(from_index) + self.road.half_width_m(to_index);
+        let (duration_s, _) = self.transition(dynamics, 0.0, way_m, self.vehicles[actor].speed_mps)?;
         let at_s = self.time_s;
         (self.vehicles[actor].lane, self.vehicles[actor].offset_m) = (to, 0.0);
         running.is_lateral.push(actor);
@@ -913,11 +913,11 @@ impl<'a> Storyboard<'a> {
         {
             return Err(self.reader.error(node, "`h` is not the direction of the road: a vehicle starts along it"));
         }
-        let Some(index) = nearest(&self.road.centres_m, point.t_m) else {
+        let Some(index) = self.road.lane_near(point.t_m) else {
             return Err(self.reader.error(node, "the road has no lane"));
         };
         let beside_m = point.t_m - self.road.centres_m[index];
-        if !(beside_m.abs() <= 0.5 * self.road.lane_width_m) {
+        if !(beside_m.abs() <= self.road.half_width_m(index)) {
             return Err(self.reader.error(node, format!("it lies {:.2} m beside the nearest lane", beside_m.abs())));
         }
         if beside_m.abs() > NOTED_OFFSET_M && round == 1 {
@@ -967,13 +967,18 @@ impl<'a> Storyboard<'a> {
             "RelativeRoadPosition" => {
                 let other = self.vehicle(node, "entityRef")?;
                 let shift_m = reader.number(node, "dt")?;
-                let lanes = shift_m / self.road.lane_width_m;
-                if (lanes - lanes.round()).abs() > 0.2 {
-                    return Err(
-                        reader.error(node, format!("`dt` of {shift_m} m does not lead to the centre of a lane"))
+                let from_m = self.road.index(other.lane).map_or(f64::NAN, |index| self.road.centres_m[index]);
+                let beside_m = |index: usize| (from_m + shift_m - self.road.centres_m[index]).abs();
+                let near = self.road.lane_near(from_m + shift_m);
+                let Some(index) = near.filter(|index| beside_m(*index) <= 0.4 * self.road.half_width_m(*index)) else {
+                    let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
+                    let message = format!(
+                        "`dt` of {shift_m} m does not lead to the centre of a driving lane along the road: these are {}",
+                        lanes.join(", ")
                     );
-                }
-                (other.s_m + reader.number(node, "ds")?, self.shifted(other.lane, lanes.round() as i32))
+                    return Err(reader.error(node, message));
+                };
+                (other.s_m + reader.number(node, "ds")?, self.road.lanes[index])
             }
             _ => {
                 let message = "only `LanePosition`, `RelativeLanePosition`, `RelativeRoadPosition` and `WorldPosition` \

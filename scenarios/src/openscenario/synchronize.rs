@@ -15,7 +15,6 @@
 //! driver does not.
 
 use super::dom::{ImportError, Node};
-use super::plane::nearest;
 use super::storyboard::{LONGEST_S, MOST_SPEED_MPS, STEP_S, Storyboard};
 
 /// Accelerations that a prescribed driver commands (m/s²): `MAX_BRAKING_MPS2` and
@@ -194,9 +193,9 @@ impl Storyboard<'_> {
     fn target_m(&self, node: &Node, name: &str) -> Result<f64, ImportError> {
         let position = self.reader.only(self.reader.child(node, &[name])?)?;
         let point = self.on_road(position)?;
-        let beside_m = nearest(&self.road.centres_m, point.t_m)
-            .map_or(f64::INFINITY, |index| (point.t_m - self.road.centres_m[index]).abs());
-        if !(beside_m <= 0.5 * self.road.lane_width_m) {
+        let lane = self.road.lane_near(point.t_m);
+        let beside_m = lane.map_or(f64::INFINITY, |lane| (point.t_m - self.road.centres_m[lane]).abs());
+        if !lane.is_some_and(|lane| beside_m <= self.road.half_width_m(lane)) {
             return Err(self.reader.error(position, format!("it lies {beside_m:.2} m beside the nearest lane")));
         }
         Ok(point.s_m)

@@ -10,7 +10,7 @@
 //! way between the two centres.
 
 use super::dom::{ImportError, Node};
-use super::plane::{RoadPoint, nearest};
+use super::plane::RoadPoint;
 use super::storyboard::{LaneChange, MOST_SPEED_MPS, STEP_S, Storyboard};
 
 /// Share of the duration of a lane change that passes between 10 % and 90 % of the way, on the
@@ -79,7 +79,9 @@ impl Storyboard<'_> {
         self.check_beginning(node, &points, vehicle)?;
         let lanes = &self.road.lanes;
         let mut lane_changes = Vec::new();
-        let changes = changes(&points, &self.road.centres_m).map_err(|message| reader.error(line, message))?;
+        let lane_near = |t_m| self.road.lane_near(t_m);
+        let changes =
+            changes(&points, &self.road.centres_m, lane_near).map_err(|message| reader.error(line, message))?;
         for Change { from, to, at_s, duration_s } in changes {
             let (from, to, line, element) = (lanes[from], lanes[to], node.line, "FollowTrajectoryAction");
             lane_changes.push(LaneChange { vehicle, at_s, from, to, duration_s, line, element });
@@ -150,7 +152,7 @@ impl Storyboard<'_> {
             let message = format!("its trajectory begins at {first_s:.2} s, and its event at {now_s:.2} s");
             return Err(self.reader.error(node, message));
         }
-        let lane = nearest(&self.road.centres_m, first.on_road.t_m).map(|index| self.road.lanes[index]);
+        let lane = self.road.lane_near(first.on_road.t_m).map(|index| self.road.lanes[index]);
         if (first.on_road.s_m - vehicle.s_m).abs() > MOST_APART_M || lane != Some(vehicle.lane) {
             let message = format!(
                 "its trajectory begins at s = {:.2} m, t = {:.2} m, and `{}` is at s = {:.2} m in lane {}",
@@ -188,10 +190,15 @@ fn speeds(points: &[Point]) -> Result<Vec<(f64, f64)>, String> {
     Ok(speeds)
 }
 
-/// Returns the lane changes of a trajectory.
-fn changes(points: &[Point], centres_m: &[f64]) -> Result<Vec<Change>, String> {
+/// Returns the lane changes of a trajectory among lanes with these centres (m). `lane_near` gives the
+/// lane of a lateral position.
+fn changes(
+    points: &[Point],
+    centres_m: &[f64],
+    lane_near: impl Fn(f64) -> Option<usize>,
+) -> Result<Vec<Change>, String> {
     let lane_of = |point: &Point| {
-        let lane = nearest(centres_m, point.on_road.t_m);
+        let lane = lane_near(point.on_road.t_m);
         let lane = lane.filter(|lane| (centres_m[*lane] - point.on_road.t_m).abs() <= MOST_BESIDE_M);
         lane.ok_or_else(|| format!("at {:.2} s it leaves the lanes of the road", point.at_s))
     };
@@ -260,6 +267,14 @@ mod tests {
         assert!(super::speeds(&[point(0.0, 0.0, 0.0), point(1.0, 500.0, 0.0)]).is_err());
     }
 
+    /// The lane changes among lanes of 3.5 m from the left on.
+    fn changes(points: &[Point], lanes: u32) -> Result<Vec<Change>, String> {
+        let centres_m: Vec<f64> = (0..lanes).map(|lane| -1.75 - 3.5 * f64::from(lane)).collect();
+        let beside_m = |lane: usize, t_m: f64| (centres_m[lane] - t_m).abs();
+        let near = |t_m| (0..centres_m.len()).min_by(|a, b| beside_m(*a, t_m).total_cmp(&beside_m(*b, t_m)));
+        super::changes(points, &centres_m, near)
+    }
+
     #[test]
     fn a_quintic_lane_change_is_found_with_its_time_and_duration() {
         let path = |x: f64| x * x * x * (10.0 + x * (6.0 * x - 15.0));
@@ -267,15 +282,15 @@ mod tests {
             .map(|step| f64::from(step) * 0.1)
             .map(|t| point(t, 30.0 * t, -1.75 - 3.5 * path(((t - 4.0) / 6.0).clamp(0.0, 1.0))))
             .collect();
-        let detected = changes(&points, &[-1.75, -5.25]).unwrap();
+        let detected = changes(&points, 2).unwrap();
         let [change] = detected[..] else { panic!("{detected:?}") };
         assert_eq!((change.from, change.to), (0, 1));
         assert!((change.at_s - 4.0).abs() < 0.05 && (change.duration_s - 6.0).abs() < 0.05, "{change:?}");
         let broken_off: Vec<_> = points.iter().copied().take(75).collect();
-        assert!(changes(&broken_off, &[-1.75, -5.25]).unwrap_err().contains("does not reach the next lane"));
+        assert!(changes(&broken_off, 2).unwrap_err().contains("does not reach the next lane"));
         let jump = [point(0.0, 0.0, -1.75), point(1.0, 30.0, -8.75)];
-        assert!(changes(&jump, &[-1.75, -5.25, -8.75]).unwrap_err().contains("more than one lane"));
+        assert!(changes(&jump, 3).unwrap_err().contains("more than one lane"));
         let off_road = [point(0.0, 0.0, -1.75), point(1.0, 30.0, 4.0)];
-        assert!(changes(&off_road, &[-1.75, -5.25]).unwrap_err().contains("leaves the lanes"));
+        assert!(changes(&off_road, 2).unwrap_err().contains("leaves the lanes"));
     }
 }
