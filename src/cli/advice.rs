@@ -84,7 +84,7 @@ fn advice(error: &CliError) -> Option<&'static str> {
         CliError::Gates(AssemblyError::NoBaseline { .. }) => Some("--paired runs the baseline, too"),
         CliError::Gates(AssemblyError::DependentSamples { .. }) => Some("--design random draws independent samples"),
         CliError::Arms(ArmsError::One { .. }) => Some("--controller names a single controller"),
-        CliError::Import(_) => {
+        CliError::Import(error) if !matches!(error, ImportFailure::Read { .. }) => {
             Some("--ego NAME names the ego, --parameter NAME=VALUE gives a value, --value-set N chooses values")
         }
         CliError::Sensitivity(_) => Some("see `closecall study sensitivity --help`"),

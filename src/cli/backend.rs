@@ -1,6 +1,7 @@
 //! The inference backend of the rear camera's network. It is loaded only by commands that may run
 //! the network.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use closecall_sensors::{SensorMode, inference_backend, set_inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::exec::{Child, ExecError, ExecSettings};
 use closecall_simulation::controller::native::command;
+use closecall_traffic::input;
 
 use super::CliError;
 use crate::exit_code::ExitCode;
@@ -25,11 +27,21 @@ pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
     let backend = inference_backend();
     if is_used && *backend != Backend::Tract {
         if let Backend::OnnxRuntime(library) = backend {
+            must_be_readable(library)?;
             try_to_load(library, backend)?;
         }
         Classifier::shipped(backend)?;
     }
     Ok(())
+}
+
+/// Refuses a library that does not exist, or is a folder.
+fn must_be_readable(library: &Path) -> Result<(), ClassifierError> {
+    let checked = input::open(library).and_then(|file| match file.metadata()?.is_dir() {
+        true => Err(ErrorKind::IsADirectory.into()),
+        false => Ok(()),
+    });
+    checked.map_err(|error| ClassifierError::Read { path: library.display().to_string(), reason: error.to_string() })
 }
 
 /// Longest time in which ONNX Runtime is loaded. An assumption: ten times the time on a slow disk.

@@ -365,6 +365,7 @@ impl From<&CliError> for ExitCode {
             CliError::Scenario(error) => Self::from(error),
             CliError::Import(ImportFailure::Read { .. }) => Self::Io,
             CliError::Import(_) => Self::InvalidInput,
+            CliError::Classifier(ClassifierError::Read { .. }) => Self::Io,
             CliError::TrajectoryData(error) if error.is_io() => Self::Io,
             CliError::Reference(error) if error.is_io() => Self::Io,
             CliError::TrajectoryData(_)

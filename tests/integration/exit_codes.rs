@@ -1,9 +1,9 @@
 //! The exit codes of the program.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::support::{closecall, code, folder, headline_with, json, library, message, program, stderr, stdout};
+use crate::support::{ROOT, closecall, code, folder, headline_with, json, library, message, program, stderr, stdout};
 
 /// Writes a scenario file.
 fn write(folder: &tempfile::TempDir, text: &str) -> PathBuf {
@@ -78,6 +78,53 @@ fn a_folder_that_cannot_be_written_is_an_error_before_the_first_sample() {
     let args = ["campaign", headline.to_str().unwrap(), "-n", "100000000", "--out", out.to_str().unwrap()];
     let output = closecall(args);
     assert_eq!(code(&output), 6, "{}", stderr(&output));
+}
+
+#[test]
+fn an_input_that_cannot_be_read_ends_with_one_code_in_every_command_and_an_empty_one_with_another() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let scans = path("scans.pcd");
+    let run = ["run", "low-thw-overtake", "--set", "duration-s=1", "--sensors", "full", "--scans", &scans];
+    assert_eq!(code(&closecall(run)), 0);
+    let full = ["run", "low-thw-overtake", "--sensors", "full"];
+    let with = |option: &'static str, value: &'static str| full.into_iter().chain([option, value]).collect::<Vec<_>>();
+    let recording = Path::new(ROOT).join("scenarios/fuzz/csv/three.csv").display().to_string();
+    for (ending, words) in [
+        ("toml", vec!["run", "FILE"]),
+        ("toml", vec!["study", "frontier", "FILE"]),
+        ("toml", with("--fitted", "FILE")),
+        ("toml", vec!["study", "anchor", "-n", "1", "--ensemble", "FILE"]),
+        ("so", with("--controller", "lib:FILE")),
+        ("fmu", with("--controller", "fmu:FILE")),
+        ("so", with("--set", "sensors.perception=\"lib:FILE\"")),
+        ("so", with("--onnxruntime", "FILE")),
+        ("onnx", with("--set", "sensors.rear-camera.model=FILE")),
+        ("parquet", vec!["study", "perceive", "FILE"]),
+        ("csv", vec!["study", "perceive", &scans, "--poses", "FILE"]),
+        ("csv", vec!["study", "perceive", &scans, "--labels", "FILE"]),
+        ("csv", vec!["traffic", "inspect", "FILE"]),
+        ("csv", vec!["traffic", "lane-changes", &recording, "--reference", "FILE"]),
+        ("csv", vec!["traffic", "calibrate", "FILE"]),
+        ("csv", vec!["traffic", "drift", "low-thw-overtake", "FILE"]),
+        ("json", vec!["campaign", "low-thw-overtake", "-n", "1", "--failures-first", "FILE"]),
+        ("xosc", vec!["tool", "import", "FILE", "--out", "own.toml"]),
+    ] {
+        let (missing, empty, taken) =
+            (path(&format!("missing.{ending}")), path(&format!("empty.{ending}")), path(&format!("folder.{ending}")));
+        fs::write(&empty, "").unwrap();
+        fs::create_dir_all(&taken).unwrap();
+        for (file, expected) in [(&missing, 6), (&empty, 3), (&taken, 6)] {
+            // A recording of scans and an ensemble may be folders, and an empty one has wrong content.
+            if file == &taken && matches!(words[..], ["study", "perceive", "FILE"] | ["study", "anchor", ..]) {
+                continue;
+            }
+            let output = closecall(words.iter().map(|word| word.replace("FILE", file)));
+            assert_eq!(code(&output), expected, "{words:?} {file}: {}", stderr(&output));
+            let name = file.rsplit('/').next().unwrap();
+            assert!(message(&output).contains(name), "{words:?}: {}", stderr(&output));
+        }
+    }
 }
 
 /// The inputs are missing: a message about one of them would show that it was read first.

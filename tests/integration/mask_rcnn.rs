@@ -86,8 +86,9 @@ fn a_network_with_another_layout_is_refused_before_any_work() {
     }
     let missing = "sensors.rear-camera.mask-rcnn.model=nowhere.onnx";
     let more = ["--onnxruntime", library_file.to_str().unwrap(), "--set", missing];
-    let text = refused(&campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
-    assert!(text.contains("nowhere.onnx"), "{text}");
+    let output = closecall(campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
+    assert_eq!(code(&output), 6, "{}", stderr(&output));
+    assert!(stderr(&output).contains("failed to read nowhere.onnx: "), "{}", stderr(&output));
 }
 
 #[test]

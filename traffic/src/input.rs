@@ -91,6 +91,13 @@ pub fn is_of_content(error: &io::Error) -> bool {
     error.kind() == ErrorKind::InvalidData
 }
 
+/// Returns a text whose lines end as on Unix. The reader of CSV tables counts lines that end with a
+/// carriage return and a line feed from the wrong one of them.
+pub fn with_line_feeds(text: &[u8]) -> Vec<u8> {
+    let is_kept = |(at, byte): &(usize, &u8)| **byte != b'\r' || text.get(at + 1) != Some(&b'\n');
+    text.iter().enumerate().filter(is_kept).map(|(_, byte)| *byte).collect()
+}
+
 /// Returns the text after its byte order mark, or `None` if it has none.
 fn without_mark(text: &str) -> Option<&str> {
     text.strip_prefix(BYTE_ORDER_MARK)
@@ -143,6 +150,11 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_a_carriage_return_before_a_line_feed_is_left_out() {
+        assert_eq!(with_line_feeds(b"\ra\r\n\r\r\nb\n\r"), b"\ra\n\r\nb\n\r");
+    }
 
     #[test]
     fn a_text_is_read_without_its_mark_and_a_large_file_is_refused() {

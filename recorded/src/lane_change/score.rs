@@ -59,9 +59,9 @@ pub struct ReferenceError {
 }
 
 impl ReferenceError {
-    /// Returns true if the cause is an I/O error.
+    /// Returns true if the file cannot be read, as opposed to having wrong content.
     pub fn is_io(&self) -> bool {
-        self.source.is_io_error()
+        matches!(self.source.kind(), csv::ErrorKind::Io(error) if !input::is_of_content(error))
     }
 }
 
@@ -72,14 +72,16 @@ impl ReferenceError {
 pub fn read_references(path: &Path) -> Result<Vec<ReferenceChange>, ReferenceError> {
     let fail = |source| ReferenceError { path: path.to_owned(), source };
     let file = input::open(path).map_err(|error| fail(error.into()))?;
+    let wrong = |message: String| fail(io::Error::new(io::ErrorKind::InvalidData, message).into());
     let mut bytes = Vec::new();
     file.take(MAX_REFERENCE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| fail(error.into()))?;
     if bytes.len() as u64 > MAX_REFERENCE_BYTES {
-        let message = format!("the file is larger than {} MiB", MAX_REFERENCE_BYTES >> 20);
-        return Err(fail(io::Error::new(io::ErrorKind::InvalidData, message).into()));
+        return Err(wrong(format!("the file is larger than {} MiB", MAX_REFERENCE_BYTES >> 20)));
     }
-    let mut reader = csv::Reader::from_reader(&bytes[..]);
-    reader.deserialize().collect::<Result<_, _>>().map_err(fail)
+    let text = input::with_line_feeds(&bytes);
+    let mut reader = csv::Reader::from_reader(&text[..]);
+    let changes: Vec<ReferenceChange> = reader.deserialize().collect::<Result<_, _>>().map_err(fail)?;
+    if changes.is_empty() { Err(wrong("there are no rows".to_owned())) } else { Ok(changes) }
 }
 
 /// Returns the lane changes of the trajectory data `name`.

@@ -20,7 +20,7 @@ pub struct ScanFileError {
 impl ScanFileError {
     /// Returns `true` if the file cannot be read at all, as opposed to having wrong content.
     pub fn is_io(&self) -> bool {
-        matches!(self.problem, ScanFileProblem::Io(_))
+        matches!(self.problem, ScanFileProblem::Io(_) | ScanFileProblem::MissingFile { .. })
     }
 }
 

@@ -21,7 +21,7 @@ pub fn members(arguments: &[PathBuf]) -> Result<Vec<Member>, MemberError> {
     for argument in arguments {
         if argument.is_dir() {
             members.extend(in_folder(argument)?);
-        } else if argument.exists() {
+        } else if argument.exists() || argument.extension().is_some_and(|extension| extension == "toml") {
             members.push(read(argument)?);
         } else {
             let name = argument.to_str().unwrap_or_default();

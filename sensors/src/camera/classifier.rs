@@ -77,6 +77,14 @@ pub enum ClassifierError {
         /// The requested backend.
         asked: Backend,
     },
+    /// The file of a network, or of the inference backend, cannot be read.
+    #[error("failed to read {path}: {reason}")]
+    Read {
+        /// The file.
+        path: String,
+        /// The reason that the system gives.
+        reason: String,
+    },
     /// The bytes of the model are not a network that the backend can run.
     #[error("failed to read the classifier's network: {reason}")]
     Model {
@@ -170,7 +178,7 @@ impl Classifier {
     pub fn of(file: Option<&str>, backend: &Backend) -> Result<Self, ClassifierError> {
         let Some(path) = file else { return Self::shipped(backend) };
         let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
-        let bytes = read_network(Path::new(path)).map_err(at)?;
+        let bytes = read_network(path)?;
         let classifier = Self::new(&bytes, backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
             other => other,
@@ -249,9 +257,12 @@ const MOST_NETWORK_BYTES: u64 = 2 << 30;
 /// Reads the file of a network.
 ///
 /// # Errors
-/// The reason, in words.
-pub(super) fn read_network(path: &Path) -> Result<Vec<u8>, String> {
-    input::read(path, MOST_NETWORK_BYTES).map_err(|error| error.to_string())
+/// [`ClassifierError::Read`], or [`ClassifierError::Model`] if the file is too large.
+pub(super) fn read_network(path: &str) -> Result<Vec<u8>, ClassifierError> {
+    input::read(Path::new(path), MOST_NETWORK_BYTES).map_err(|error| match input::is_of_content(&error) {
+        true => ClassifierError::Model { reason: format!("{path}: {error}") },
+        false => ClassifierError::Read { path: path.to_owned(), reason: error.to_string() },
+    })
 }
 
 fn load_backend(backend: &Backend) -> Result<Environment, String> {
@@ -312,10 +323,11 @@ mod tests {
         let mut shipped = Classifier::of(None, &Backend::Tract).unwrap();
         assert_eq!(own.classify(&crop).unwrap(), shipped.classify(&crop).unwrap());
         assert_eq!((own.name, shipped.name), (good, SHIPPED_FILE.to_owned()));
-        for wrong in [bad, path("none.onnx")] {
-            let error = Classifier::of(Some(&wrong), &Backend::Tract).unwrap_err();
-            assert!(matches!(&error, ClassifierError::Model { reason } if reason.starts_with(&wrong)), "{error}");
-        }
+        let error = Classifier::of(Some(&bad), &Backend::Tract).unwrap_err();
+        assert!(matches!(&error, ClassifierError::Model { reason } if reason.starts_with(&bad)), "{error}");
+        let none = path("none.onnx");
+        let error = Classifier::of(Some(&none), &Backend::Tract).unwrap_err();
+        assert!(matches!(&error, ClassifierError::Read { path, .. } if *path == none), "{error}");
         std::fs::remove_dir_all(&folder).unwrap();
     }
 

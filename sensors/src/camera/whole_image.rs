@@ -49,7 +49,7 @@ impl MaskRcnn {
             return Ok(InstanceDetector::new(SHIPPED_MASK_RCNN, labels.as_ref(), backend)?.with_input(self.input));
         };
         let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
-        let bytes = read_network(std::path::Path::new(path)).map_err(at)?;
+        let bytes = read_network(path)?;
         let detector = InstanceDetector::new(&bytes, labels.as_ref(), backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
             ClassifierError::Layout { actual, wanted } => {
