@@ -494,7 +494,9 @@ mod tests {
             let mut baseline = baseline(in_error, gap_m);
             let scenario = baseline.scenarios.get_mut("headline").unwrap();
             (scenario.errors, scenario.in_error) = (in_error.len() as u64, in_error.to_vec());
-            scenario.margins.values_mut().for_each(|quantiles| drop(quantiles.insert(SMALLEST.to_owned(), gap_m)));
+            for quantiles in scenario.margins.values_mut() {
+                quantiles.insert(SMALLEST.to_owned(), gap_m);
+            }
             baseline
         };
         let shrunk = |before: &[u64], after: &[u64]| {

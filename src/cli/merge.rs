@@ -64,6 +64,12 @@ pub(super) struct MergeArgs {
     format: Format,
 }
 
+/// Returns what changed of the controllers while the parts ran, in words.
+fn changes_of(parts: &[PathBuf]) -> Result<Vec<String>, FolderError> {
+    let changes = parts.iter().map(|part| kept_changes(&Folder::open(part)));
+    Ok(changes.collect::<Result<Vec<_>, _>>()?.concat())
+}
+
 /// Merges the parts of a campaign that samples a rare event. Nothing runs.
 fn merge_rare(args: &MergeArgs, parts: &RareParts) -> Result<ExitCode, CliError> {
     let is_named = [
@@ -82,6 +88,7 @@ fn merge_rare(args: &MergeArgs, parts: &RareParts) -> Result<ExitCode, CliError>
     let gates = args.gates.gates(is_paired, manifest.campaign.sampling.design, None)?;
     let event = manifest.event.parse().map_err(|error: EventError| CliError::usage(error.to_string()))?;
     let reports = parts.estimate(&works)?;
+    let changes = changes_of(&args.parts)?;
     let folder = parts.write(&args.out, session::arguments(), args.resume)?;
     let rare = Rare {
         method: manifest.method,
@@ -94,7 +101,8 @@ fn merge_rare(args: &MergeArgs, parts: &RareParts) -> Result<ExitCode, CliError>
         format: args.format,
         can_draw_seed: false,
     };
-    let results = Results { event, reports: &reports, works: &works };
+    keep_changes(&Folder::open(&args.out), &changes)?;
+    let results = Results { event, reports: &reports, works: &works, changes: &changes };
     rare.conclude(results, &manifest.campaign, Some(&folder))
 }
 
@@ -131,8 +139,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     // Rates that an earlier merge has left are none of these parts.
     Fidelity::remove(saved.folder())?;
     let rates = fast_parts.map(|fast| fast.merge(saved.folder(), args.resume, is_trusted)).transpose()?;
-    let changes = args.parts.iter().map(|part| kept_changes(&Folder::open(part)));
-    let changes = changes.collect::<Result<Vec<_>, FolderError>>()?.concat();
+    let changes = changes_of(&args.parts)?;
     keep_changes(saved.folder(), &changes)?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let mut judged = tally.judgement();

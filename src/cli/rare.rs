@@ -9,7 +9,9 @@ use std::sync::Arc;
 use clap::Args;
 use closecall_campaign::action::{Action, Resume};
 use closecall_campaign::arguments::positive;
+use closecall_campaign::controller_watch::ControllerWatch;
 use closecall_campaign::execution::CampaignError;
+use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::{GateSet, GateSource, LEAST_SAMPLES, ProbabilitySpec};
 use closecall_campaign::interrupt::Signal;
 use closecall_campaign::manifest::Manifest;
@@ -197,6 +199,9 @@ impl Rare<'_> {
         let (method, workers, part) = (self.method, campaign.workers, plan.partition);
         let rare = RarePlan { method, nearness, goal, workers, remote, part };
         let folder = self.folder.map(|path| RareFolder::lock(path, &manifest, self.resume)).transpose()?;
+        // Other machines run the files that were shipped at the start.
+        let watched = self.ray.is_none().then_some(&manifest.campaign);
+        let mut watch = ControllerWatch::start(watched, self.folder.map(Folder::open).as_ref())?;
         let mut journal = folder.as_ref().map(RareFolder::journal).transpose()?;
         let mut stop = campaign.stop.clone();
         session::stop_on_request(&mut stop);
@@ -204,10 +209,17 @@ impl Rare<'_> {
         let _heartbeat = heartbeat(&bar);
         let (mut reports, mut runs_of_part) = (Vec::new(), Vec::new());
         for work in campaign.works.iter().enumerate() {
-            match rare.run(work, journal.as_mut(), &stop, &mut || bar.inc(1)) {
+            let mut on_run = || {
+                bar.inc(1);
+                watch.look();
+            };
+            match rare.run(work, journal.as_mut(), &stop, &mut on_run) {
                 Ok(report) => reports.push(report),
                 Err(RareError::PartEnds { runs }) => runs_of_part.push((work.1.file.config().name.clone(), runs)),
-                Err(RareError::Stopped) => return Ok(self.stopped(&bar)),
+                Err(RareError::Stopped) => {
+                    watch.finish()?;
+                    return Ok(self.stopped(&bar));
+                }
                 Err(RareError::Campaign(error)) => return Err(error.into()),
                 Err(error @ (RareError::NothingVaries { .. } | RareError::MissingRun { .. })) => {
                     return Err(CliError::usage(error.to_string()));
@@ -215,11 +227,14 @@ impl Rare<'_> {
             }
         }
         bar.finish_and_clear();
+        let changes = watch.finish()?;
         if let Some(part) = part {
             self.print_part(part, &runs_of_part, manifest.campaign.sampling.seed);
-            return Ok(ExitCode::Pass);
+            changes.iter().for_each(|change| print_error(format_args!("{change}\n")));
+            return Ok(if changes.is_empty() { ExitCode::Pass } else { ExitCode::Invalid });
         }
-        let results = Results { event: nearness.expression(), reports: &reports, works: &campaign.works };
+        let event = nearness.expression();
+        let results = Results { event, reports: &reports, works: &campaign.works, changes: &changes };
         let code = self.conclude(results, &manifest.campaign, folder.as_ref())?;
         if self.method == Method::Search {
             for (report, work) in reports.iter().zip(&campaign.works) {
@@ -236,19 +251,21 @@ impl Rare<'_> {
         manifest: &Manifest,
         folder: Option<&RareFolder>,
     ) -> Result<ExitCode, CliError> {
-        let Results { event, reports, works } = results;
+        let Results { event, reports, works, changes } = results;
         let judged = |(report, work): (&RareReport, &Arc<Work>)| {
             let gate = self.gate_of(event, work);
             Judged {
                 report: if gate.is_some() { self.with_weakened(event, report, work) } else { report.clone() },
                 gate,
+                has_changed: !changes.is_empty(),
             }
         };
         let judged: Vec<Judged> = reports.iter().zip(works).map(judged).collect();
         // A search has no gate, and judges by its exit code.
         let judges = judged.iter().any(|judged| judged.gate.is_some()) || self.method == Method::Search;
         let known = known_seed(judges, manifest, self.can_draw_seed);
-        let remarks: Vec<String> = known.into_iter().chain(self.not_judged(event, works)).collect();
+        let remarks = changes.iter().cloned().chain(known).chain(self.not_judged(event, works));
+        let remarks: Vec<String> = remarks.collect();
         let seed = works.first().map(|work| work.sampling.seed);
         let result = json_of(&judged, seed, &remarks);
         if let Some(folder) = folder {
@@ -411,12 +428,16 @@ pub(super) struct Results<'a> {
     pub(super) reports: &'a [RareReport],
     /// The scenarios.
     pub(super) works: &'a [Arc<Work>],
+    /// What changed of the controllers while they ran, in words.
+    pub(super) changes: &'a [String],
 }
 
 /// A report with the gate that judges it.
 struct Judged {
     report: RareReport,
     gate: Option<ProbabilityGate>,
+    /// Whether a controller changed while it ran.
+    has_changed: bool,
 }
 
 impl Judged {
@@ -425,6 +446,9 @@ impl Judged {
         let report = &self.report;
         if report.errors > 0 {
             return ExitCode::SampleError;
+        }
+        if self.has_changed {
+            return ExitCode::Invalid;
         }
         if let Some(search) = report.search {
             return match search.has_event {
@@ -464,6 +488,7 @@ impl Judged {
         self.gate?;
         Some(match self.is_low() {
             _ if self.report.errors > 0 => "ERROR",
+            _ if self.has_changed => "INVALID",
             Some(true) if !self.report.not_judged.is_empty() => "NOT JUDGED",
             Some(true) => "PASS",
             Some(false) => "FAIL",

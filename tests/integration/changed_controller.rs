@@ -87,3 +87,25 @@ fn a_replay_does_not_say_that_nothing_has_changed_if_a_file_that_the_controller_
     assert!(told.contains("nor have the files that the commands name"), "{told}");
     assert!(told.contains("files that a controller imports are not checked"), "{told}");
 }
+
+#[test]
+fn a_controller_that_changes_while_a_rare_event_is_sampled_makes_the_estimate_invalid() {
+    let folder = folder();
+    let script = folder.path().join("own.sh");
+    // Some run of the campaign changes it.
+    let changes = "n=$(cat count 2>/dev/null || echo 0)\necho $((n + 1)) > count\n\
+                   [ $n -ge 6 ] && [ ! -e edited ] && { : > edited; echo '# more' >> own.sh; }\n";
+    fs::write(&script, format!("{changes}{STEADY}")).unwrap();
+    let run = |more: &[&str]| {
+        let words = "campaign low-thw-overtake --design importance --event collision --max-probability 0.9 -n 60 \
+                     --sensors ground-truth --set duration-s=5 --controller-timeout-ms 60000 --out out --controller";
+        let output =
+            program().current_dir(folder.path()).args(words.split(' ')).arg("exec:sh own.sh").args(more).output();
+        stdout(&output.unwrap(), 7)
+    };
+    let text = run(&[]);
+    assert!(text.contains("INVALID: ") && text.contains("the controller changed during the campaign"), "{text}");
+    // The file is as it was, and the runs are not.
+    fs::write(&script, format!("{changes}{STEADY}")).unwrap();
+    assert!(run(&["--resume"]).contains("the controller changed during the campaign"));
+}

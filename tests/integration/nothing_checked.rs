@@ -85,7 +85,7 @@ fn a_campaign_without_gates_and_checks_is_not_judged() {
 }
 
 #[test]
-fn a_controller_of_which_no_validity_check_has_a_result_does_not_pass() {
+fn a_controller_without_a_result_of_its_validity_checks_does_not_pass() {
     let folder = folder();
     let path = bare(folder.path(), "overtake-without-brake");
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
