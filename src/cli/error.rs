@@ -248,6 +248,7 @@ fn point_remedy(problem: &ScanFileProblem) -> &'static str {
             "; --drop-invalid leaves out points without a position"
         }
         ScanFileProblem::Point(PointError::Frame { .. }) => "; --frame names the frame",
+        ScanFileProblem::Intensity { .. } => "; --intensity-scale converts them",
         _ => "",
     }
 }

@@ -319,8 +319,13 @@ fn the_messages_of_ros_2_give_the_tracks_of_the_table() {
 
 /// Returns the message with which a recording is refused.
 fn refusal(scans: &Path, scenario: &Path) -> String {
+    refusal_with(scans, scenario, 3)
+}
+
+/// Returns the message of a recording that is refused with this exit code.
+fn refusal_with(scans: &Path, scenario: &Path, expected: i32) -> String {
     let output = closecall(["study", "perceive", scans.to_str().unwrap(), scenario.to_str().unwrap()]);
-    assert_eq!(code(&output), 3, "{}", message(&output));
+    assert_eq!(code(&output), expected, "{}", message(&output));
     message(&output)
 }
 
@@ -399,6 +404,17 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
         lines.swap(last, last - 1);
         (lines.join("\n") + "\n").into_bytes()
     };
+    // The table with this value in every row of a column.
+    let column = |name: &str, column: usize, value: &str| {
+        let changed = lines(name).into_iter().enumerate().map(|(row, line)| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if row > 0 {
+                fields[column] = value;
+            }
+            fields.join(",")
+        });
+        (changed.collect::<Vec<_>>().join("\n") + "\n").into_bytes()
+    };
     let cases: Vec<(&str, Vec<u8>, &str)> = vec![
         ("scan-00.pcd", replaced("scan-00.pcd", "FIELDS x ", "FIELDS u "), "no field `x`, only u, y, z"),
         ("scan-00.pcd", replaced("scan-00.pcd", "DATA binary", "DATA zip"), "`zip` is unknown; `ascii`, `binary` and"),
@@ -438,6 +454,27 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
             replaced("scans.csv", "scan-01.pcd,0.1", "scan-01.pcd,0.0"),
             "is not after 0 s, the previous one of `rear-lidar`",
         ),
+        (
+            "scans.csv",
+            replaced("scans.csv", "scan-01.pcd", "scan-00.pcd"),
+            "scans.csv, line 3, column `file`: `scan-00.pcd` is listed twice",
+        ),
+        ("scans.csv", replaced("scans.csv", "scan-00.pcd,0.0", "scan-00.pcd,1e18"), "a time in seconds is needed"),
+        ("poses.csv", column("poses.csv", 4, "108.0"), "m/s and m are needed"),
+        (
+            "poses.csv",
+            (lines("poses.csv").join("\r\n") + "\r\n").replacen("\n0.1,", "\nnoon,", 1).into_bytes(),
+            "poses.csv, line 3, column `time_s`: `noon` is not a finite number",
+        ),
+        ("poses.csv", column("poses.csv", 3, "1.6"), "counter-clockwise from x to y"),
+        ("labels.csv", column("labels.csv", 0, "99.0"), "times must increase"),
+        ("labels.csv", column("labels.csv", 5, "180.0"), "an angle from -2π to 2π rad is needed"),
+        ("labels.csv", column("labels.csv", 7, "4600"), "a length from 0.1 to 40 m is needed"),
+        (
+            "labels.csv",
+            [lines("labels.csv")[0].as_bytes(), b"\n99.0,a,car,-50.0,0.0,0.0,36.0,4.6,1.8\n"].concat(),
+            "the labels go from 99 to 99 s, the scans from 0 to 5.9 s",
+        ),
     ];
     let args = ["study", "perceive", recording.to_str().unwrap(), scenario.to_str().unwrap(), "--frame", "sensor"];
     // The beams without a return have no position.
@@ -457,15 +494,56 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
         assert!(text.contains(expected), "{expected}: {text}");
         std::fs::write(recording.join(name), before).unwrap();
     }
+    // The axis and the left of the sensor are swapped.
+    let clouds: Vec<PathBuf> = std::fs::read_dir(&recording).unwrap().map(|file| file.unwrap().path()).collect();
+    let clouds: Vec<PathBuf> =
+        clouds.into_iter().filter(|path| path.extension().is_some_and(|end| end == "pcd")).collect();
+    let swap = || {
+        for path in &clouds {
+            let text = String::from_utf8_lossy(&std::fs::read(path).unwrap()[..40]).into_owned();
+            let [from, to] = if text.contains("x y z") { ["x y z", "y x z"] } else { ["y x z", "x y z"] };
+            let mut bytes = std::fs::read(path).unwrap();
+            let place = bytes.windows(5).position(|window| window == from.as_bytes()).unwrap();
+            bytes[place..place + 5].copy_from_slice(to.as_bytes());
+            std::fs::write(path, bytes).unwrap();
+        }
+    };
+    swap();
+    let output = closecall([&args[..], &["--drop-invalid"]].concat());
+    let text = message(&output);
+    assert!(code(&output) == 3 && text.contains("no point is in the field of view of the LiDARs rear-lidar"), "{text}");
+    swap();
+    for (scale, expected) in [
+        (
+            "255",
+            "have an intensity above 4, at which a registration plate saturates the receiver: 1 is a white surface",
+        ),
+        ("1e-46", "number above 0"),
+    ] {
+        let output = closecall([&args[..], &["--drop-invalid", "--intensity-scale", scale]].concat());
+        let text = message(&output);
+        assert!(code(&output) != 0 && text.contains(expected), "{scale}: {text}");
+    }
+    let cloud = good("scan-00.pcd");
+    for (intensity, expected) in [(-0.4_f32, "has intensity = -0.4, but a number of 0 or more is needed"), (0.0, "")] {
+        let mut changed = cloud.clone();
+        let header = changed.windows(12).position(|window| window == b"DATA binary\n").unwrap() + 12;
+        changed[header..].chunks_exact_mut(16).for_each(|point| point[12..].copy_from_slice(&intensity.to_le_bytes()));
+        std::fs::write(recording.join("scan-00.pcd"), changed).unwrap();
+        let output = closecall([&args[..], &["--drop-invalid"]].concat());
+        assert_eq!(code(&output), if expected.is_empty() { 0 } else { 3 }, "{}", message(&output));
+        assert!(message(&output).contains(expected), "{}", message(&output));
+    }
+    std::fs::write(recording.join("scan-00.pcd"), cloud).unwrap();
     std::fs::remove_file(recording.join("poses.csv")).unwrap();
-    let text = refusal(&recording, &scenario);
+    let text = refusal_with(&recording, &scenario, 6);
     assert!(text.contains("poses.csv: there is no such file, which gives the poses of the ego"), "{text}");
     let empty = folder.path().join("empty");
     std::fs::create_dir(&empty).unwrap();
     assert!(refusal(&empty, &scenario).contains("empty: the folder has no *.pcd file"));
     std::fs::write(empty.join("one.pcd"), "").unwrap();
     assert!(
-        refusal(&empty, &scenario)
+        refusal_with(&empty, &scenario, 6)
             .contains("scans.csv: there is no such file, which gives the time at which each scan ends")
     );
     let other = folder.path().join("scans.las");

@@ -72,22 +72,28 @@ impl<'a> Cdr<'a> {
         Ok(String::from_utf8_lossy(bytes.strip_suffix(&[0]).unwrap_or(bytes)).into_owned())
     }
 
-    /// Takes a header, and returns its stamp.
-    fn stamp(&mut self) -> Result<Time, ScanFileProblem> {
+    /// Takes a header, and returns its stamp and its frame.
+    fn header(&mut self) -> Result<(Time, String), ScanFileProblem> {
         const NS_PER_S: i64 = 1_000_000_000;
         let seconds = i32::from_le_bytes(self.aligned("header.stamp.sec")?);
         let nanoseconds = u32::from_le_bytes(self.aligned("header.stamp.nanosec")?);
-        self.string("header.frame_id")?;
-        Ok(Time::from_ns(i64::from(seconds) * NS_PER_S + i64::from(nanoseconds)))
+        let frame = self.string("header.frame_id")?;
+        Ok((Time::from_ns(i64::from(seconds) * NS_PER_S + i64::from(nanoseconds)), frame))
     }
 }
+
+/// Frames that do not move (REP 105 of ROS).
+const FIXED_FRAMES: [&str; 3] = ["earth", "map", "odom"];
 
 /// Returns the stamp and the points of a `PointCloud2`.
 pub(super) fn point_cloud(bytes: &[u8]) -> Result<(Time, Cloud), ScanFileProblem> {
     const MESSAGE: &str = "sensor_msgs/msg/PointCloud2";
     let mut cdr = Cdr::new(bytes, MESSAGE)?;
     let wrong = |reason: String| ScanFileProblem::Message { message: MESSAGE, reason };
-    let stamp = cdr.stamp()?;
+    let (stamp, frame) = cdr.header()?;
+    if FIXED_FRAMES.contains(&frame.trim_start_matches('/')) {
+        return Err(wrong(format!("its frame is `{frame}`, which does not move with the sensor or the ego")));
+    }
     let (height, width) = (cdr.u32("height")?, cdr.u32("width")?);
     let count = cdr.u32("fields")?;
     let mut fields = Vec::new();
@@ -136,7 +142,7 @@ pub(super) fn point_cloud(bytes: &[u8]) -> Result<(Time, Cloud), ScanFileProblem
 /// Returns the pose of an `Odometry`.
 pub(super) fn odometry(bytes: &[u8]) -> Result<Pose, ScanFileProblem> {
     let mut cdr = Cdr::new(bytes, "nav_msgs/msg/Odometry")?;
-    let time = cdr.stamp()?;
+    let (time, _) = cdr.header()?;
     cdr.string("child_frame_id")?;
     let mut numbers = |what| Ok::<_, ScanFileProblem>([cdr.f64(what)?, cdr.f64(what)?, cdr.f64(what)?]);
     let [x_m, y_m, _] = numbers("pose.pose.position")?;

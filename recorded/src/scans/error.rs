@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use closecall_sensors::lidar::PointError;
+use closecall_sensors::lidar::{MAX_INTENSITY, PointError};
 
 /// An error of a recording of scans, its poses or its labels. Nothing of it is used.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +79,11 @@ pub enum ScanFileProblem {
     /// A recording has no scans of the LiDARs.
     #[error("there are no scans of the LiDARs {0}")]
     NoScans(String),
+    /// No point of a recording can be from the LiDARs.
+    #[error(
+        "no point is in the field of view of the LiDARs {0} of the scenario: x looks along the axis, y to its left, z up"
+    )]
+    NothingSeen(String),
     /// A file that goes with the recording does not exist.
     #[error("there is no such file, which gives {gives}: a table with the columns {columns}")]
     MissingFile {
@@ -216,6 +221,34 @@ pub enum ScanFileProblem {
         first_s: f64,
         /// Time of the last pose (s).
         last_s: f64,
+    },
+    /// The poses contradict each other.
+    #[error("{0}")]
+    Motion(String),
+    /// No label is at a time of the scans.
+    #[error(
+        "the labels have no time in common with the scans: the labels go from {} to {} s, the scans from {} to {} s",
+        labels_s[0], labels_s[1], scans_s[0], scans_s[1]
+    )]
+    NoLabels {
+        /// Times of the first and of the last label (s).
+        labels_s: [f64; 2],
+        /// Times of the first and of the last scan (s).
+        scans_s: [f64; 2],
+    },
+    /// Every point is black.
+    #[error("every point has the intensity 0: leave out the field of a sensor that measures none")]
+    NoIntensity,
+    /// Most points are brighter than a plate.
+    #[error(
+        "{brighter} of {points} points have an intensity above {MAX_INTENSITY}, at which a registration plate saturates the \
+         receiver: 1 is a white surface that faces the sensor"
+    )]
+    Intensity {
+        /// Number of these points.
+        brighter: u64,
+        /// Number of all points.
+        points: u64,
     },
     /// The points of a file are not those that it states.
     #[error("{0}")]

@@ -1,6 +1,7 @@
 //! The labels of a recording: where the other vehicles are.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use closecall_traffic::{Time, VehicleClass};
@@ -58,20 +59,20 @@ impl Labels {
                 let names = VehicleClass::ALL.map(|candidate| format!("`{}`", candidate.name())).join(", ");
                 row.place(2).error(ScanFileProblem::UnknownWord { text: class.to_owned(), allowed: names })
             })?;
-            let size = |column: usize| match row.number(column)? {
-                value if value > 0.0 => Ok(value),
-                value => {
-                    let problem = ScanFileProblem::OutOfRange { value, allowed: "a size above 0" };
-                    Err(row.place(column).error(problem))
-                }
+            let within = |column: usize, least: f64, most: f64, allowed: &'static str| match row.number(column)? {
+                value if (least..=most).contains(&value) => Ok(value),
+                value => Err(row.place(column).error(ScanFileProblem::OutOfRange { value, allowed })),
             };
             let label = Label {
-                time: Time::from_s(row.number(0)?),
+                time: row.time(0)?,
                 class,
                 at_m: [row.number(3)?, row.number(4)?],
-                heading_rad: row.number(5)?,
+                heading_rad: within(5, -TAU, TAU, "an angle from -2π to 2π rad")?,
                 speed_mps: row.number(6)?,
-                size_m: [size(7)?, size(8)?],
+                size_m: [
+                    within(7, 0.1, 40.0, "a length from 0.1 to 40 m")?,
+                    within(8, 0.1, 5.0, "a width from 0.1 to 5 m")?,
+                ],
             };
             let of_vehicle = vehicles.entry(id.to_owned()).or_default();
             if let Some(previous) = of_vehicle.last().filter(|previous| previous.time >= label.time) {
@@ -85,6 +86,12 @@ impl Labels {
         }
         let (names, of_vehicles) = vehicles.into_iter().unzip();
         Ok(Self { names, of_vehicles })
+    }
+
+    /// Returns the times of the first and of the last label (s).
+    pub fn span_s(&self) -> [f64; 2] {
+        let times = || self.of_vehicles.iter().flatten().map(|label| label.time);
+        [times().min(), times().max()].map(|time| time.map_or(0.0, Time::s))
     }
 
     /// Returns whether the labels of some vehicle reach from before `time` to after it.

@@ -1,7 +1,7 @@
 //! A folder of point clouds in the PCD format, version 0.7, of the Point Cloud Library (*The PCD
 //! (Point Cloud Data) file format*), with an index that gives the time of each cloud.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +47,7 @@ impl PcdRecording {
             return Err(origin.error(ScanFileProblem::EmptyFolder));
         }
         let rows = read_table(&folder.join(INDEX), INDEX_FORMAT)?;
-        let mut entries = Vec::with_capacity(rows.len());
+        let (mut entries, mut listed) = (Vec::with_capacity(rows.len()), HashSet::new());
         for row in &rows {
             let sensor = match row.text(2) {
                 Some(name) => match options.sensor(name) {
@@ -59,9 +59,14 @@ impl PcdRecording {
             };
             #[expect(clippy::cast_possible_truncation, reason = "the sensor's place is in single precision")]
             let sensor_x_m = row.number_or_none(4)?.map(|x_m| x_m as f32);
+            let name = row.needed_text(0)?;
+            let path = folder.join(name);
+            if !listed.insert(path.clone()) {
+                return Err(row.place(0).error(ScanFileProblem::Csv(format!("`{name}` is listed twice"))));
+            }
             entries.push(Entry {
-                path: folder.join(row.needed_text(0)?),
-                time: Time::from_s(row.number(1)?),
+                path,
+                time: row.time(1)?,
                 sensor,
                 mirror_side: mirror_side(row.text(3)).map_err(|problem| row.place(3).error(problem))?,
                 sensor_x_m,

@@ -23,6 +23,20 @@ const CURVATURE_OVER_M: f64 = 100.0;
 const LEAST_PATH_M: f64 = 10.0;
 /// Longest time between two poses (s): at 1 rad/s² a yaw rate errs by 0.1 rad/s within half of it.
 const LONGEST_GAP: Time = Time::from_ms(500);
+/// Time over which speeds and headings are compared with the path: the noise of two places is small
+/// beside the way of a vehicle on a highway.
+const CHORD: Time = Time::from_ms(1_000);
+/// Least way in that time that is compared (m): the noise of the places of a vehicle that stands is
+/// no path.
+const LEAST_CHORD_M: f64 = 5.0;
+/// Way from which on the speeds are compared with the path (m; assumption).
+const LEAST_DRIVEN_M: f64 = 50.0;
+/// Largest ratio of the ways by speeds and by places (assumption). Another unit differs by more:
+/// knots by 1.9, miles per hour by 2.2.
+const MOST_RATIO: f64 = 1.5;
+/// Largest angle between heading and path in the median (rad; assumption). Angles of drift are
+/// smaller, and other conventions differ by a quarter of a turn.
+const MOST_BESIDE_RAD: f64 = 0.5;
 /// A table of poses.
 const FORMAT: TableFormat = TableFormat {
     columns: &["time_s", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "s_m", "d_m", "heading_rad"],
@@ -70,7 +84,7 @@ impl Poses {
             let number = |column: usize| row.number(column);
             let on_road = [row.number_or_none(6)?, row.number_or_none(7)?, row.number_or_none(8)?];
             let pose = Pose {
-                time: Time::from_s(number(0)?),
+                time: row.time(0)?,
                 at_m: [number(1)?, number(2)?],
                 yaw_rad: number(3)?,
                 speed_mps: number(4)?,
@@ -94,13 +108,14 @@ impl Poses {
             }
             poses.push(pose);
         }
-        Ok(Self::from_checked(Origin::file(path), poses))
+        Self::from_ordered(Origin::file(path), poses)
     }
 
     /// Returns the poses of a recording.
     ///
     /// # Errors
-    /// [`ScanFileError`] if there are none, or if a time is not after the previous one.
+    /// [`ScanFileError`] if there are none, if a time is not after the previous one, or if speeds or
+    /// headings contradict the path.
     pub(super) fn new(origin: Origin, poses: Vec<Pose>) -> Result<Self, ScanFileError> {
         if poses.is_empty() {
             return Err(origin.error(ScanFileProblem::NoRows));
@@ -108,10 +123,11 @@ impl Poses {
         if let Some(pair) = poses.windows(2).find(|pair| pair[0].time >= pair[1].time) {
             return Err(origin.error(goes_back(pair[1].time, pair[0].time)));
         }
-        Ok(Self::from_checked(origin, poses))
+        Self::from_ordered(origin, poses)
     }
 
-    fn from_checked(origin: Origin, poses: Vec<Pose>) -> Self {
+    fn from_ordered(origin: Origin, poses: Vec<Pose>) -> Result<Self, ScanFileError> {
+        check_motion(&poses).map_err(|problem| origin.error(problem))?;
         let (mut yaw_rad, mut driven_m) = (Vec::with_capacity(poses.len()), Vec::with_capacity(poses.len()));
         for (index, pose) in poses.iter().enumerate() {
             match index.checked_sub(1) {
@@ -128,7 +144,7 @@ impl Poses {
                 }
             }
         }
-        Self { origin, poses, yaw_rad, driven_m }
+        Ok(Self { origin, poses, yaw_rad, driven_m })
     }
 
     /// Returns the time of the last pose.
@@ -200,6 +216,45 @@ impl Poses {
     }
 }
 
+/// Refuses speeds and headings that contradict the path. Their unit or their frame is another.
+fn check_motion(poses: &[Pose]) -> Result<(), ScanFileProblem> {
+    let (mut path_m, mut by_speed_m, mut beside_rad, mut first) = (0.0_f64, 0.0_f64, Vec::new(), 0);
+    for (last, pose) in poses.iter().enumerate() {
+        let elapsed = pose.time - poses[first].time;
+        if elapsed < CHORD {
+            continue;
+        }
+        let [x_m, y_m] = [0, 1].map(|axis| pose.at_m[axis] - poses[first].at_m[axis]);
+        let chord_m = maths::hypot(x_m, y_m);
+        let speeds_mps = poses[first..=last].iter().map(|pose| pose.speed_mps);
+        let driven_m = elapsed.s() * speeds_mps.sum::<f64>() / (last - first + 1) as f64;
+        if chord_m.max(driven_m) >= LEAST_CHORD_M {
+            path_m += chord_m;
+            by_speed_m += driven_m;
+        }
+        if chord_m >= LEAST_CHORD_M {
+            let off_rad = poses[first.midpoint(last)].yaw_rad - maths::atan2(y_m, x_m);
+            let turn_rad = std::f64::consts::TAU;
+            beside_rad.push((off_rad - turn_rad * (off_rad / turn_rad).round()).abs());
+        }
+        first = last;
+    }
+    let [less_m, more_m] = [path_m.min(by_speed_m), path_m.max(by_speed_m)];
+    if more_m >= LEAST_DRIVEN_M && more_m > MOST_RATIO * less_m {
+        return Err(ScanFileProblem::Motion(format!(
+            "the ego drives {by_speed_m:.0} m by its speeds, and {path_m:.0} m by its places: m/s and m are needed"
+        )));
+    }
+    beside_rad.sort_by(f64::total_cmp);
+    match beside_rad.get(beside_rad.len() / 2) {
+        Some(off_rad) if *off_rad > MOST_BESIDE_RAD => Err(ScanFileProblem::Motion(format!(
+            "half of the headings differ by {off_rad:.1} rad or more from the direction in which the ego drives: they are in \
+             rad, counter-clockwise from x to y"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 fn goes_back(time: Time, previous: Time) -> ScanFileProblem {
     ScanFileProblem::TimeGoesBack { time_s: time.s(), previous_s: previous.s(), of: String::new() }
 }
@@ -242,6 +297,34 @@ mod tests {
         let twice = vec![Pose::default(); 2];
         let error = Poses::new(Origin::file("odometry"), twice).unwrap_err().to_string();
         assert!(error.contains("odometry") && error.contains("times must increase"), "{error}");
+    }
+
+    #[test]
+    fn speeds_and_headings_of_another_unit_or_frame_are_refused() {
+        let error_of = |change: &dyn Fn(&mut Pose)| {
+            let mut poses = bend().poses;
+            poses.iter_mut().for_each(change);
+            Poses::new(Origin::file("bend"), poses).err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        for factor in [0.0, 3.6, 1.944, 2.237] {
+            let error = error_of(&|pose| pose.speed_mps *= factor);
+            assert!(error.contains("270 m by its places: m/s and m are needed"), "{factor}: {error}");
+        }
+        assert!(error_of(&|pose| pose.at_m = [0.0; 2]).contains("0 m by its places"));
+        // Degrees, clockwise from north, from y, and backwards.
+        for change in [
+            &(|pose: &mut Pose| pose.yaw_rad = pose.yaw_rad.to_degrees()) as &dyn Fn(&mut Pose),
+            &|pose| pose.yaw_rad = std::f64::consts::FRAC_PI_2 - pose.yaw_rad,
+            &|pose| pose.yaw_rad -= std::f64::consts::FRAC_PI_2,
+            &|pose| pose.yaw_rad += std::f64::consts::PI,
+        ] {
+            let error = error_of(change);
+            assert!(error.contains("half of the headings differ by"), "{error}");
+        }
+        // A whole turn more, a slow ego, noise of the places of one that stands.
+        assert_eq!(error_of(&|pose| pose.yaw_rad += std::f64::consts::TAU), "");
+        assert_eq!(error_of(&|pose| pose.speed_mps *= 1.2), "");
+        assert_eq!(error_of(&|pose| (pose.at_m, pose.speed_mps) = ([pose.at_m[0] % 3.0, 0.0], 0.0)), "");
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! Small tables in CSV: poses, labels, and the index of a folder.
 
-use std::io;
+use std::io::{self, Read as _};
 use std::path::Path;
 
-use closecall_traffic::input;
+use closecall_traffic::{Time, input};
 
 use super::error::{Origin, ScanFileError, ScanFileProblem};
+
+/// Latest time (s): the year 2262. Nanoseconds count to it.
+const LATEST_S: f64 = 9.2e9;
 
 /// A row of a table: its line, and the fields of the named columns.
 pub(super) struct TableRow {
@@ -31,11 +34,14 @@ pub(super) fn read_table(path: &Path, format: TableFormat) -> Result<Vec<TableRo
     let TableFormat { columns, needed, gives } = format;
     let origin = Origin::file(path);
     let list = || columns[..needed].iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    let file = input::open(path).map_err(|error| match error.kind() {
+    let mut bytes = Vec::new();
+    let read = input::open(path).and_then(|mut file| file.read_to_end(&mut bytes));
+    read.map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => origin.error(ScanFileProblem::MissingFile { gives, columns: list() }),
         _ => origin.error(error),
     })?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+    let text = input::with_line_feeds(&bytes);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(&text[..]);
     let of_csv = |error: csv::Error| {
         let place = error.position().map(|at| format!("line {}", at.line())).unwrap_or_default();
         let problem = match error.into_kind() {
@@ -88,6 +94,14 @@ impl TableRow {
     pub(super) fn number(&self, column: usize) -> Result<f64, ScanFileError> {
         self.needed_text(column)?;
         self.number_or_none(column).map(Option::unwrap_or_default)
+    }
+
+    /// Returns the time of a column that every row needs.
+    pub(super) fn time(&self, column: usize) -> Result<Time, ScanFileError> {
+        match self.number(column)? {
+            time_s if time_s.abs() <= LATEST_S => Ok(Time::from_s(time_s)),
+            value => Err(self.place(column).error(ScanFileProblem::OutOfRange { value, allowed: "a time in seconds" })),
+        }
     }
 
     /// Returns the finite number of a column; `None` if it is empty or missing.

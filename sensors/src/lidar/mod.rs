@@ -71,6 +71,7 @@ pub use material::Material;
 pub use model::LidarModel;
 pub(crate) use pattern::HALF_FIELD_DEG;
 pub use pattern::Pattern;
+pub use power::MAX_INTENSITY;
 pub(crate) use power::extinction_per_m;
 pub use pulse::echo_pulse_width_ns;
 pub use rear::RearLidar;

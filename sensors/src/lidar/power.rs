@@ -25,7 +25,7 @@ use super::Lidar;
 use super::kind::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
 
 /// Intensity at which the receiver saturates, as a reflectivity.
-pub(super) const MAX_INTENSITY: f32 = 4.0;
+pub const MAX_INTENSITY: f32 = 4.0;
 
 /// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations,
 /// and cannot raise the return above the threshold.

@@ -93,6 +93,14 @@ pub enum PointError {
         /// Its value.
         value: f64,
     },
+    /// An intensity is negative.
+    #[error("point {point} has intensity = {value}, but a number of 0 or more is needed")]
+    Intensity {
+        /// The point.
+        point: usize,
+        /// Its intensity.
+        value: f32,
+    },
     /// The LiDAR of the scenario has no such beam.
     #[error(
         "point {point} has the beam {beam}, but the LiDAR `{lidar}` of the scenario has the beams 0 to {last}: name the \
@@ -272,6 +280,10 @@ impl RecordedPoints {
             if let Some((point, value)) = values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
                 return Err(PointError::NotFinite { point, quantity, value: f64::from(*value) });
             }
+        }
+        let negative = self.intensity.iter().flatten().enumerate().find(|(_, value)| **value < 0.0);
+        if let Some((point, &value)) = negative {
+            return Err(PointError::Intensity { point, value });
         }
         let last = lidar.kind.beams() - 1;
         let wrong = self.beam.iter().flatten().enumerate().find(|(_, beam)| usize::from(**beam) > last);

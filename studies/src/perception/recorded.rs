@@ -11,6 +11,7 @@
 //! place of an approach.
 
 use closecall_recorded::scans::{Labels, Poses, Recording, ScanFileError, ScanFileProblem, TakenScan};
+use closecall_sensors::lidar::{MAX_INTENSITY, RecordedPoints};
 use closecall_sensors::{RecordedPerception, RecordedScanError, Scene, SceneVehicle, SensorError, TrackAudit};
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::{
@@ -146,10 +147,12 @@ pub fn study_recording(
     let linger = Time::from_s(input.perception.longest_period_s()) - CONTROL_STEP;
     let (mut lives, mut judge) = (Vec::new(), input.labels.map(Judge::new));
     let (mut latest, mut last_step) = (start, start);
+    let mut brightness = Brightness::default();
     for step in 0.. {
         let time = start + CONTROL_STEP * step;
         while let Some(scan) = next.take_if(|scan| scan.points.end <= time) {
             latest = latest.max(scan.points.end);
+            brightness.note(&scan.points);
             input.take(scan, &mut lidars)?;
             next = input.recording.next_scan()?;
         }
@@ -165,6 +168,15 @@ pub fn study_recording(
             _ => see(&RecordedStep { time, tracks, scene: None }),
         }
     }
+    if lidars.iter().all(|lidar| lidar.outside == lidar.points) {
+        return Err(input.recording.error(ScanFileProblem::NothingSeen(input.lidars.join(", "))).into());
+    }
+    brightness.check().map_err(|problem| input.recording.error(problem))?;
+    let truth = judge.map(Judge::finish);
+    if let Some(labels) = input.labels.filter(|_| truth.as_ref().is_some_and(|truth| truth.judged_s == 0.0)) {
+        let problem = ScanFileProblem::NoLabels { labels_s: labels.span_s(), scans_s: [start.s(), latest.s()] };
+        return Err(input.recording.error(problem).into());
+    }
     let confirmed = lives.iter().filter(|life| life.was_confirmed);
     let mut confirmed_lives_s: Vec<f64> = confirmed.map(|life| (life.last - life.first).s()).collect();
     confirmed_lives_s.sort_by(f64::total_cmp);
@@ -174,7 +186,7 @@ pub fn study_recording(
         has_map: input.poses.has_map(),
         tracks: lives.len() as u64,
         confirmed_lives_s,
-        truth: judge.map(Judge::finish),
+        truth,
     })
 }
 
@@ -193,6 +205,36 @@ impl RecordedInput<'_> {
         of_lidar.points += count;
         of_lidar.outside += outside as u64;
         Ok(())
+    }
+}
+
+/// The intensities of all points that have one.
+#[derive(Default)]
+struct Brightness {
+    points: u64,
+    /// Number of points with an intensity above 0.
+    lit: u64,
+    /// Number of points with an intensity above the intensity at which a receiver saturates.
+    brighter: u64,
+}
+
+impl Brightness {
+    fn note(&mut self, points: &RecordedPoints) {
+        for value in points.intensity.iter().flatten() {
+            self.points += 1;
+            self.lit += u64::from(*value > 0.0);
+            self.brighter += u64::from(*value > MAX_INTENSITY);
+        }
+    }
+
+    /// Refuses intensities in another unit.
+    fn check(&self) -> Result<(), ScanFileProblem> {
+        let Self { points, lit, brighter } = *self;
+        match (points, lit) {
+            (1.., 0) => Err(ScanFileProblem::NoIntensity),
+            _ if 2 * brighter > points => Err(ScanFileProblem::Intensity { brighter, points }),
+            _ => Ok(()),
+        }
     }
 }
 
