@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use crate::native_controllers::{compile, lib};
-use crate::support::{code, folder, message, program, stderr, stdout};
+use crate::support::{closecall, code, folder, message, program, stderr, stdout};
 
 /// A controller that says that it runs, in a file beside it.
 pub(crate) const TELLING: &str = r#"#!/bin/sh
