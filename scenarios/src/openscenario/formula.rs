@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::maths;
 
-/// The values of the parameters that an element can use: its own declarations, and the declarations
-/// of the elements around it. An inner value hides an outer one of the same name.
+/// The values of the parameters that an element can use. The element and the elements around it
+/// declare them. An inner value hides an outer one of the same name.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Values<'a> {
     inner: BTreeMap<String, String>,
@@ -81,7 +81,8 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    fn takes(&mut self, sign: char) -> bool {
+    /// Skips `sign` if it comes next. Returns whether it did.
+    fn skip(&mut self, sign: char) -> bool {
         let rest = self.rest.trim_start();
         let after_sign = rest.strip_prefix(sign);
         self.rest = after_sign.unwrap_or(rest);
@@ -91,9 +92,9 @@ impl Parser<'_> {
     fn sum(&mut self) -> Result<f64, String> {
         let mut total = self.product()?;
         loop {
-            if self.takes('+') {
+            if self.skip('+') {
                 total += self.product()?;
-            } else if self.takes('-') {
+            } else if self.skip('-') {
                 total -= self.product()?;
             } else {
                 return Ok(total);
@@ -104,11 +105,11 @@ impl Parser<'_> {
     fn product(&mut self) -> Result<f64, String> {
         let mut total = self.operand()?;
         loop {
-            if self.takes('*') {
+            if self.skip('*') {
                 total *= self.operand()?;
-            } else if self.takes('/') {
+            } else if self.skip('/') {
                 total /= self.operand()?;
-            } else if self.takes('%') {
+            } else if self.skip('%') {
                 total %= self.operand()?;
             } else {
                 return Ok(total);
@@ -127,27 +128,27 @@ impl Parser<'_> {
     }
 
     fn inner_operand(&mut self) -> Result<f64, String> {
-        if self.takes('-') {
+        if self.skip('-') {
             return Ok(-self.operand()?);
         }
-        if self.takes('(') {
+        if self.skip('(') {
             let value = self.sum()?;
-            return if self.takes(')') { Ok(value) } else { Err("a parenthesis is not closed".to_owned()) };
+            return if self.skip(')') { Ok(value) } else { Err("a parenthesis is not closed".to_owned()) };
         }
-        if self.takes('$') {
+        if self.skip('$') {
             let name = self.word();
             let text = self.values.get(&name).ok_or_else(|| self.values.unknown(&name))?;
             return text.trim().parse().map_err(|_| format!("the parameter `{name}` is `{text}`, and no number"));
         }
         let word = self.word();
-        if !self.takes('(') {
+        if !self.skip('(') {
             return word.parse().map_err(|_| format!("`{word}` is neither a number nor a parameter such as `$name`"));
         }
         let mut arguments = vec![self.sum()?];
-        while self.takes(',') {
+        while self.skip(',') {
             arguments.push(self.sum()?);
         }
-        if !self.takes(')') {
+        if !self.skip(')') {
             return Err(format!("`{word}(` is not closed"));
         }
         match (word.as_str(), &arguments[..]) {
@@ -159,12 +160,12 @@ impl Parser<'_> {
             ("sign", [a]) => Ok(if *a == 0.0 { 0.0 } else { a.signum() }),
             ("max", [a, b]) => Ok(a.max(*b)),
             ("min", [a, b]) => Ok(a.min(*b)),
-            ("pow", [a, b]) => Ok(maths::exp(b * maths::ln(*a))),
+            ("pow", [a, b]) => Ok(maths::powf(*a, *b)),
             _ => Err(format!("`{word}` with {} arguments is not a function of an expression", arguments.len())),
         }
     }
 
-    /// Takes a name or a number, with its exponent.
+    /// Reads a name, or a number with its exponent.
     fn word(&mut self) -> String {
         let rest = self.rest.trim_start();
         let is_number = rest.starts_with(|c: char| c.is_ascii_digit() || c == '.');
@@ -195,6 +196,8 @@ mod tests {
         assert_eq!(number("${30 + (-10.0 * ($v / 3.6))}"), 30.0 + 200.0 / 3.6);
         assert_eq!(number("${-$v * 2 - 1e-1}"), 39.9);
         assert_eq!(number("${max(abs($v), sqrt(4)) % 7}"), 6.0);
+        assert_eq!(number("${pow(2, 3)}"), 8.0);
+        assert_eq!(number("${pow(-2, 2)}"), 4.0);
         assert_eq!(resolve("$name", &values).unwrap(), "car");
         assert!(resolve("$name$", &values).is_err());
         for wrong in ["${$w}", "${1 +}", "${(1}", "${$name * 2}", "${1 / 0}", "${wrong(1)}", "${2 3}"] {
