@@ -27,7 +27,7 @@ impl Failure {
     /// Returns the failure of a command. The thread of the command knows how its caller names arguments.
     pub(crate) fn of(error: &CliError) -> Self {
         let location = match error {
-            CliError::Scenario(error) => of_scenario(error),
+            CliError::Scenario(error) => location_in_scenario(error),
             CliError::TrajectoryData(error) => Location {
                 file: Some(error.path.display().to_string()),
                 line: error.line,
@@ -50,7 +50,7 @@ pub(crate) fn exception(py: Python<'_>, error: &CliError) -> PyErr {
 
 /// Returns the exception of a scenario that cannot be used.
 pub(crate) fn scenario_exception(py: Python<'_>, error: &ScenarioError) -> PyErr {
-    let (code, message, location) = (ExitCode::from(error), error.to_string(), of_scenario(error));
+    let (code, message, location) = (ExitCode::from(error), error.to_string(), location_in_scenario(error));
     raise(py, &Failure { code, message, location })
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn sample_exception(py: Python<'_>, sample: u64, error: &SampleError)
     raise(py, &Failure::new(ExitCode::SampleError, format!("failed to run sample {sample}: {error}")))
 }
 
-fn of_scenario(error: &ScenarioError) -> Location {
+fn location_in_scenario(error: &ScenarioError) -> Location {
     let key = match error {
         ScenarioError::Value { source, .. } => Some(source.path.to_string()),
         ScenarioError::UnusedParameter { name, .. } => Some(format!("parameters.{name}")),

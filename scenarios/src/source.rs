@@ -161,7 +161,7 @@ fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError
     if let Some(file) = existing(path) {
         return ScenarioFile::load(&file, settings);
     }
-    match of_library(path)? {
+    match scenario_in_library(path)? {
         Some((name, text)) => ScenarioFile::parse(&library::path(name), text, settings),
         None => ScenarioFile::load(path, settings),
     }
@@ -169,7 +169,7 @@ fn read(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError
 
 /// Returns the name and the text of the scenario of the library that an argument names; `None` for
 /// the path of a file.
-fn of_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, ScenarioError> {
+fn scenario_in_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, ScenarioError> {
     let word = path.to_str().unwrap_or_default();
     let scenario = library::named(word).and_then(|name| Some((name, library::text(name)?)));
     if scenario.is_none() && (is_name(path) || (path.extension().is_none() && library::has_folder(word))) {
@@ -190,7 +190,7 @@ fn of_library(path: &Path) -> Result<Option<(&'static str, &'static str)>, Scena
 /// [`ScenarioError`] if there is neither, or the file cannot be read as text.
 pub fn text(path: &Path) -> Result<String, ScenarioError> {
     if existing(path).is_none()
-        && let Some((_, text)) = of_library(path)?
+        && let Some((_, text)) = scenario_in_library(path)?
     {
         return Ok(text.to_owned());
     }

@@ -11,7 +11,7 @@ const REQUIRED_M: [[f64; 2]; 6] = [[5.0, 0.0], [5.0, 3.75], [5.0, -3.75], [60.0,
 /// Returns the health of all sensors together: failed if the working sensors no longer see all of
 /// the required places that all sensors see, and degraded if any sensor is not healthy. `view`
 /// returns the view of a sensor from the rear end.
-pub(crate) fn of_all<S>(sensors: &[S], health: impl Fn(&S) -> Health, view: impl Fn(&S) -> RearView) -> Health {
+pub(crate) fn combined<S>(sensors: &[S], health: impl Fn(&S) -> Health, view: impl Fn(&S) -> RearView) -> Health {
     if let [only] = sensors {
         return health(only);
     }

@@ -362,7 +362,7 @@ impl LidarChain {
     /// Returns the health of the sensors together. Without a radar the chain works, less well.
     pub(crate) fn health(&self) -> Health {
         let radars = self.radars.as_ref().map_or(Health::Ok, RearRadars::health);
-        match joint_health::of_all(&self.sensors, |sensor| sensor.health, |sensor| sensor.view(0.0)) {
+        match joint_health::combined(&self.sensors, |sensor| sensor.health, |sensor| sensor.view(0.0)) {
             Health::Ok if radars != Health::Ok => Health::Degraded,
             health => health,
         }

@@ -145,6 +145,6 @@ impl DetectionClassifier for SeveralCameras {
                 axis_azimuth_rad: camera.yaw_rad,
             }
         };
-        joint_health::of_all(&self.members, |member| member.classifier.health(), view)
+        joint_health::combined(&self.members, |member| member.classifier.health(), view)
     }
 }

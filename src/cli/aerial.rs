@@ -20,7 +20,7 @@ use super::backend::check_backend;
 use super::help::{examples, heading};
 use super::output::{outln, print_text, print_written};
 use super::progress::watched;
-use super::protect::{must_be_folder, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, protect};
 use crate::exit_code::ExitCode;
 
 /// The names of the files that a flight writes: the truth, the tracks as they are seen and with the
@@ -149,7 +149,7 @@ impl AerialArgs {
 
 pub(super) fn aerial(args: &AerialArgs) -> Result<ExitCode, CliError> {
     let folders = args.folders()?;
-    let inputs = of_trajectories(&args.data.files);
+    let inputs = files_of_trajectories(&args.data.files);
     for path in folders.iter().flat_map(|folder| FLIGHT_FILES.map(|name| folder.join(name))) {
         protect(&inputs, &[("--out", Some(&path))])?;
     }

@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::SensorsChoice;
 use super::argument::Argument;
 use super::help::heading;
-use super::protect::of_controller;
+use super::protect::files_of_controller;
 use super::saved::LimitArgs;
 
 /// The controller under test.
@@ -84,7 +84,7 @@ pub(super) struct ArmArgs {
 impl ArmArgs {
     /// Returns the files that the command of the controller names.
     pub(super) fn files(&self) -> Vec<PathBuf> {
-        self.controller.controller.iter().flat_map(of_controller).collect()
+        self.controller.controller.iter().flat_map(files_of_controller).collect()
     }
 
     /// Returns the arm of a scenario that judges this function.
@@ -153,7 +153,7 @@ impl ComparisonArgs {
 
     /// Returns the files that the commands of the controllers name.
     pub(super) fn files(&self, tested: &ArmArgs) -> Vec<PathBuf> {
-        let arms = self.arms.iter().flat_map(|list| &list.0).flat_map(of_controller);
+        let arms = self.arms.iter().flat_map(|list| &list.0).flat_map(files_of_controller);
         tested.files().into_iter().chain(arms).collect()
     }
 }

@@ -31,7 +31,7 @@ use super::args::{Format, ReadArgs, ReadFiles, SetArgs, read_noting};
 use super::help::{examples, heading};
 use super::new::scenario_file;
 use super::output::{during, outln, print_error, print_text, print_written, textln, warn};
-use super::protect::{must_be_folder, must_be_writable, of_campaign, protect};
+use super::protect::{files_of_campaign, must_be_folder, must_be_writable, protect};
 use super::saved::SavedArgs;
 use crate::exit_code::ExitCode;
 
@@ -161,7 +161,7 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     saved.folder().check_journal()?;
     let of_nearest = search.as_ref().map(|_| PathBuf::from(format!("{}-nearest.toml", case.file.config().name)));
     let paths = output_files(&case, args.output.as_deref().or(of_nearest.as_deref()))?;
-    protect(&of_campaign(&args.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
+    protect(&files_of_campaign(&args.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;
     paths.iter().try_for_each(|path| must_be_writable(Some(path)))?;
     let minimized = during(format!("minimizing a failure of {}", args.dir.display()), || match search {
         Some(search) => search.run(&saved, args.runs.unwrap_or(NEAREST_RUNS)),

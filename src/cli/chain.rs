@@ -50,7 +50,7 @@ use super::ending::EndArgs;
 use super::gates::GateArgs;
 use super::help::{examples, heading};
 use super::output::{made_by, print_error, warn};
-use super::protect::{must_be_folder, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, protect};
 use super::results::{ArtifactArgs, ResultsArgs};
 use crate::exit_code::ExitCode;
 
@@ -132,7 +132,7 @@ struct Chain {
 }
 
 pub(super) fn chain(args: &ChainArgs) -> Result<ExitCode, CliError> {
-    let inputs = of_trajectories(&args.data.files);
+    let inputs = files_of_trajectories(&args.data.files);
     protect(&inputs, &[("--out", Some(&args.out))])?;
     must_be_folder(Some(&args.out))?;
     let controllers = match args.controller.choice(Function::Mis)? {
@@ -256,7 +256,7 @@ impl Chain {
                 }
                 Err(error) => return Err(error.into()),
             };
-            origins.encounters.push(origin(&name, &recordings[index].path, (&approach, chosen)));
+            origins.encounters.push(origin(&name, &recordings[index].path, &approach, chosen));
             encounters.push((index, approach, file));
         }
         Ok(Self { recordings, origins, encounters })
@@ -323,7 +323,7 @@ fn distinct<'a>(name: String, taken: impl Iterator<Item = &'a String> + Clone) -
 }
 
 /// Returns the recorded seconds and values of an encounter.
-fn origin(name: &str, path: &Path, (approach, chosen): (&Approach, Relevant)) -> Origin {
+fn origin(name: &str, path: &Path, approach: &Approach, chosen: Relevant) -> Origin {
     let values = &approach.values;
     Origin {
         scenario: name.to_owned(),

@@ -18,7 +18,7 @@ use super::arms::ControllerArgs;
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{print_error, print_written, textln};
-use super::protect::{of_campaign, of_controller, of_scenario, protect};
+use super::protect::{files_of_campaign, files_of_controller, files_of_scenario, protect};
 use super::saved::{TrustArgs, difference_from_journal};
 use crate::exit_code::ExitCode;
 
@@ -106,7 +106,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     if args.value_sets != 1 && !args.forms.is_empty() && !args.forms.contains(&FormChoice::Logical) {
         return Err(CliError::usage("--value-sets is of the logical form, and --form names others only"));
     }
-    let chosen = if args.source.is_dir() { of_folder(args)? } else { of_file(args)? };
+    let chosen = if args.source.is_dir() { chosen_in_campaign(args)? } else { chosen_in_file(args)? };
     let forms = match args.forms.as_slice() {
         [] => Form::OPENSCENARIO.to_vec(),
         forms => forms.iter().map(|form| Form::from(*form)).collect(),
@@ -121,8 +121,8 @@ pub(super) fn export(args: &ExportArgs) -> Result<ExitCode, CliError> {
     if forms.iter().any(|form| form.needs_run()) {
         let outcome = run_guarded(scenario, *key, arm, &mut motion)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-        let of_campaign = |saved| difference_from_journal(saved, [&outcome]);
-        difference = campaign.as_ref().map(of_campaign).transpose()?.flatten();
+        let difference_from = |saved| difference_from_journal(saved, [&outcome]);
+        difference = campaign.as_ref().map(difference_from).transpose()?.flatten();
     }
     let (controller, motion) = (arm.controller.name(), &motion);
     let files = Case { file, scenario, key: *key, controller, motion, value_sets }.files(&forms);
@@ -151,7 +151,7 @@ fn must_leave_nothing(files: &CaseFiles, folder: &Path) -> Result<(), CliError> 
     }
 }
 
-fn of_file(args: &ExportArgs) -> Result<Chosen, CliError> {
+fn chosen_in_file(args: &ExportArgs) -> Result<Chosen, CliError> {
     if args.scenario.is_some() || args.arm.is_some() {
         let path = args.source.display();
         return Err(CliError::usage(format!("--scenario and --arm belong to a campaign, and {path} is no folder")));
@@ -164,12 +164,12 @@ fn of_file(args: &ExportArgs) -> Result<Chosen, CliError> {
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let drawn = (args.sample..end).map(|sample| file.space().sample(Design::Random, seed, sample, end));
     let arm = super::arms::arm(&args.controller.choice(file.config().function)?, args.sensors);
-    let inputs = of_scenario(&file);
+    let inputs = files_of_scenario(&file);
     let key = RunKey { seed, sample: args.sample };
     Ok(Chosen { value_sets: drawn.collect(), scenario, key, arm, inputs, file, campaign: None })
 }
 
-fn of_folder(args: &ExportArgs) -> Result<Chosen, CliError> {
+fn chosen_in_campaign(args: &ExportArgs) -> Result<Chosen, CliError> {
     if args.seed.is_some() || args.sensors.is_some() {
         return Err(CliError::usage("a campaign has its own seed and sensors: leave out --seed and --sensors"));
     }
@@ -189,12 +189,12 @@ fn of_folder(args: &ExportArgs) -> Result<Chosen, CliError> {
     let count = file.space().samples(sampling.design, sampling.samples);
     let end = args.sample.saturating_add(args.value_sets).min(count);
     let drawn = (args.sample..end).map(|sample| file.space().sample(sampling.design, key.seed, sample, count));
-    let inputs = inputs_of(&args.source, manifest.arms.iter().flat_map(of_controller));
+    let inputs = inputs_of(&args.source, manifest.arms.iter().flat_map(files_of_controller));
     let (value_sets, arm) = (drawn.collect(), saved.arm(args.arm.as_deref())?);
     let campaign = args.set.settings.is_empty().then_some(saved);
     Ok(Chosen { value_sets, arm, scenario, key, inputs, file, campaign })
 }
 
 fn inputs_of(folder: &Path, controllers: impl Iterator<Item = PathBuf>) -> Vec<PathBuf> {
-    of_campaign(folder).into_iter().chain(controllers).collect()
+    files_of_campaign(folder).into_iter().chain(controllers).collect()
 }

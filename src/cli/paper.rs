@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::{FilesArgs, smooth_noting, warn_without_lane_changes};
 use super::help::{examples, heading};
 use super::output::{during, print_written, write_charts};
-use super::protect::{must_be_folder, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, protect};
 use super::robustness::refused;
 use crate::exit_code::ExitCode;
 
@@ -45,7 +45,7 @@ pub(super) struct PaperArgs {
 
 pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let index = args.output.join("index.html");
-    protect(&of_trajectories(&args.data.files), &[("--out", Some(&index))])?;
+    protect(&files_of_trajectories(&args.data.files), &[("--out", Some(&index))])?;
     must_be_folder(Some(&args.output))?;
     let files = smooth_noting(&args.data)?;
     let is_in_doubt = files.iter().any(|file| file.is_in_doubt);

@@ -17,7 +17,7 @@ use super::arms::{ArmArgs, ComparisonArgs};
 use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{during, print_error, print_written, textln};
-use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
+use super::protect::{files_of_campaign, files_of_scenario, protect};
 use super::saved::{TrustArgs, difference_from_journal};
 use crate::exit_code::ExitCode;
 
@@ -61,7 +61,8 @@ pub(super) struct PlotArgs {
 }
 
 pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
-    let (films, difference) = if args.source.is_dir() { of_campaign(args)? } else { (of_scenario(args)?, None) };
+    let (films, difference) =
+        if args.source.is_dir() { films_of_campaign(args)? } else { (films_of_scenario(args)?, None) };
     args.output.write(&encounter(&films), args.width_mm)?;
     for film in &films {
         textln!("{}: {}", film.title(), film.headline());
@@ -73,13 +74,17 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
     }))
 }
 
-fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
+/// Films a sample of a scenario file, in every arm.
+fn films_of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.scenario.is_some() {
         return Err(CliError::usage("--scenario chooses a scenario of a campaign: name its folder instead of a file"));
     }
     let (set, of_arms) = args.set.by_arm();
     let file = set.load(&args.source)?;
-    protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--out", Some(args.output.path()))])?;
+    protect(
+        &[files_of_scenario(&file), args.comparison.files(&args.arm)].concat(),
+        &[("--out", Some(args.output.path()))],
+    )?;
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
@@ -88,7 +93,7 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
 
 /// Films a sample of a campaign as the campaign ran it, in every arm. Returns the films, and a message
 /// if one of them is another run than the campaign's.
-fn of_campaign(args: &PlotArgs) -> Result<(Vec<Film>, Option<String>), CliError> {
+fn films_of_campaign(args: &PlotArgs) -> Result<(Vec<Film>, Option<String>), CliError> {
     if args.seed.is_some() || !args.set.settings.is_empty() {
         return Err(CliError::usage("a campaign has its own seed and settings: --seed and --set cannot change them"));
     }

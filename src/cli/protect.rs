@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-pub(super) use closecall_campaign::arguments::files_of_campaign as of_campaign;
-pub(super) use closecall_campaign::inputs::{of_controller, of_scenario, of_trajectories};
+pub(super) use closecall_campaign::arguments::files_of_campaign;
+pub(super) use closecall_campaign::inputs::{files_of_controller, files_of_scenario, files_of_trajectories};
 use closecall_traffic::atomic::{WriteError, check_folder, check_writable};
 pub(super) use closecall_traffic::same_file::Output;
 use closecall_traffic::same_file::check_outputs;

@@ -18,7 +18,7 @@ use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{outln, print_written};
 use super::progress::watched;
-use super::protect::{must_be_writable, of_scenario, protect};
+use super::protect::{files_of_scenario, must_be_writable, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic record`.
@@ -64,7 +64,7 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
 
 fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let file = args.sim.set.load(&args.scenario)?;
-    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &[("--out", Some(&args.output))])?;
+    protect(&[files_of_scenario(&file), args.sim.arm.files()].concat(), &[("--out", Some(&args.output))])?;
     check_ending(&args.output)?;
     must_be_writable(Some(&args.output))?;
     let mut recorder = TrafficRecorder::default();
@@ -85,7 +85,7 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let file = args.sim.set.load(&args.scenario)?;
     let truth = ground_truth_path(&args.output);
     let outputs = [("--out", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
-    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
+    protect(&[files_of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
     check_ending(&args.output)?;
     must_be_writable(Some(&args.output))?;
     let chosen = recorded_actor(file.config(), actor)

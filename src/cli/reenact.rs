@@ -20,7 +20,7 @@ use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
 use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
 use super::output::{made_by, outln, print_text, print_written};
-use super::protect::{must_be_writable, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_writable, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
 
@@ -80,7 +80,7 @@ pub(super) struct ReenactArgs {
 }
 
 pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
-    let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
+    let inputs = [files_of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let outputs = [&[("--out", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
     protect(&inputs, &outputs)?;
     must_be_writable(args.output.as_deref())?;

@@ -9,7 +9,7 @@ use super::CliError;
 use super::args::{Format, SavedSampleArgs, SetArgs};
 use super::help::{examples, heading};
 use super::output::print_error;
-use super::protect::{of_campaign, of_controller, protect};
+use super::protect::{files_of_campaign, files_of_controller, protect};
 use super::run::print;
 use super::watch::{WatchArgs, run_watched};
 use crate::exit_code::ExitCode;
@@ -39,9 +39,9 @@ pub(super) struct ReplayArgs {
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     let saved = args.saved_sample.saved.open(&args.saved_sample.dir)?;
     saved.folder().check_journal()?;
-    let controllers = saved.manifest().arms.iter().flat_map(of_controller);
+    let controllers = saved.manifest().arms.iter().flat_map(files_of_controller);
     protect(
-        &of_campaign(&args.saved_sample.dir).into_iter().chain(controllers).collect::<Vec<_>>(),
+        &files_of_campaign(&args.saved_sample.dir).into_iter().chain(controllers).collect::<Vec<_>>(),
         &args.watch.outputs(),
     )?;
     // Whether the folder is trusted is said before what is wrong in it.
@@ -65,7 +65,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     }
     let settings = [saved.manifest().settings(), args.set.settings.clone()].concat();
     let outcomes = run_watched(&scenario, key, &arms, &args.watch, &settings)?;
-    print((&scenario, &arms), &outcomes, args.format, &settings);
+    print(&scenario, &arms, &outcomes, args.format, &settings);
     if !args.set.settings.is_empty() {
         return Ok(ExitCode::Pass);
     }

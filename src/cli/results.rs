@@ -25,7 +25,7 @@ use super::CliError;
 use super::actions::{command_for, quoted};
 use super::help::heading;
 use super::output::{print_error, print_report_files, warn};
-use super::protect::{of_controller, of_scenario};
+use super::protect::{files_of_controller, files_of_scenario};
 use crate::exit_code::ExitCode;
 
 /// Largest number of recordings that are named one by one.
@@ -215,8 +215,8 @@ pub(super) fn remember(folder: &Folder) {
 
 /// Locks the default folder, and reports the place of earlier results.
 fn in_default_folder(is_resumed: bool, campaign: &Campaign, manifest: &Manifest) -> Result<LockedFolder, FolderError> {
-    let scenarios = campaign.works.iter().flat_map(|work| of_scenario(&work.file));
-    let inputs: Vec<PathBuf> = scenarios.chain(manifest.arms.iter().flat_map(of_controller)).collect();
+    let scenarios = campaign.works.iter().flat_map(|work| files_of_scenario(&work.file));
+    let inputs: Vec<PathBuf> = scenarios.chain(manifest.arms.iter().flat_map(files_of_controller)).collect();
     let working_folder = Path::new("");
     check_inputs(working_folder, &inputs)?;
     if is_resumed {

@@ -15,7 +15,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format};
 use super::help::{examples, heading};
 use super::output::{during, outln, print_error, print_text, write_charts};
-use super::protect::{must_be_folder, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic robustness`.
@@ -45,7 +45,7 @@ pub(super) struct RobustnessArgs {
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     let charts = args.plot.as_ref().map(|folder| ROBUSTNESS_CHARTS.map(|name| folder.join(name)));
     for chart in charts.iter().flatten() {
-        protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
+        protect(&files_of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     must_be_folder(args.plot.as_deref())?;
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };

@@ -18,7 +18,7 @@ use super::args::{FittedArgs, Format, SimulationArgs};
 use super::arms::ComparisonArgs;
 use super::help::{examples, heading};
 use super::output::{outln, print_text, textln};
-use super::protect::{of_scenario, protect};
+use super::protect::{files_of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
 use crate::exit_code::ExitCode;
 
@@ -52,7 +52,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let (set, of_arms) = args.sim.set.by_arm();
     let file = args.fitted.load(&args.scenario, &set)?;
     let fitted = args.fitted.fitted.iter().cloned().collect();
-    protect(&[of_scenario(&file), args.comparison.files(&args.sim.arm), fitted].concat(), &args.watch.outputs())?;
+    protect(&[files_of_scenario(&file), args.comparison.files(&args.sim.arm), fitted].concat(), &args.watch.outputs())?;
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
@@ -64,13 +64,13 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     arms.iter().filter_map(|arm| arm.sensors).try_for_each(|mode| file.check_faults_in(mode))?;
     scenario.sensors.program().as_ref().map_or(Ok(()), try_program)?;
     let outcomes = run_watched(&scenario, key, &arms, &args.watch, file.settings())?;
-    print((&scenario, &arms), &outcomes, args.format, file.settings());
+    print(&scenario, &arms, &outcomes, args.format, file.settings());
     Ok(ExitCode::Pass)
 }
 
 /// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first. `settings`
 /// are the settings of the command line.
-pub(super) fn print((scenario, arms): (&Scenario, &[Arm]), outcomes: &[Outcome], format: Format, settings: &[Setting]) {
+pub(super) fn print(scenario: &Scenario, arms: &[Arm], outcomes: &[Outcome], format: Format, settings: &[Setting]) {
     let settings = Some(settings);
     match (format, outcomes) {
         (Format::Json, [outcome]) => outln!("{:#}", json::stamped(json::outcome(outcome), None, settings)),

@@ -16,7 +16,7 @@ use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
 use super::help::{examples, heading};
 use super::output::{during, made_by, outln, print_text, print_written, write_charts};
-use super::protect::{must_be_folder, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, protect};
 use super::reenact::chosen_by;
 use crate::exit_code::ExitCode;
 
@@ -79,7 +79,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     args.from.map(variation).transpose()?;
     let path = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
-    let files = of_trajectories(std::slice::from_ref(&args.file));
+    let files = files_of_trajectories(std::slice::from_ref(&args.file));
     protect(&files, &[("--out", svg.as_deref()), ("--out", rrd.as_deref())])?;
     must_be_folder(args.output.as_deref())?;
     // The margin increase system needs a lead vehicle; a driver that is sampled does not.
@@ -89,7 +89,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         let source = format!("{} (track {})", args.file.display(), encounter.change.track_id);
         let zero = step_zero(&encounter, (Path::new(&source), &args.set.settings), args.seed);
         let zero = zero.map_err(|error| match error {
-            StepZeroError::Step(error) => of_step(error, 0),
+            StepZeroError::Step(error) => step_error(error, 0),
             not_reproduced @ StepZeroError::NotReproduced(_) => {
                 CliError::NotReproduced { file: args.file.display().to_string(), source: Box::new(not_reproduced) }
             }
@@ -114,7 +114,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
     let mut steps = vec![zero.step];
     let scenario_of = |value: StepValue<'_>| {
         let made = sampled(&encounter, (&zero.driver, Some(value)), inputs);
-        made.map_err(|error| of_value(&args.vary, value, error))
+        made.map_err(|error| value_error(&args.vary, value, error))
     };
     // The last value is checked first: the message names it as the user wrote it, not one between.
     variation.steps().last().map(scenario_of).transpose()?;
@@ -122,7 +122,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         let step = scenario_of(value)?;
         let work = format!("running step {number} of {}", args.steps);
         let done = during(work, || run_step(&encounter, value.label(), Some(value.value), &step, args.seed));
-        let done = done.map_err(|error| of_step(error, number))?;
+        let done = done.map_err(|error| step_error(error, number))?;
         films.extend(done.film);
         all.runs.push(done.run);
         steps.push(step);
@@ -153,7 +153,7 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
 
 /// Returns the error of a value that the parameter cannot have. The user has written no file that the
 /// message could name.
-fn of_value(parameter: &str, StepValue { value, .. }: StepValue<'_>, error: ScenarioError) -> CliError {
+fn value_error(parameter: &str, StepValue { value, .. }: StepValue<'_>, error: ScenarioError) -> CliError {
     match error {
         ScenarioError::Value { source, .. } => {
             CliError::VariedValue { parameter: parameter.to_owned(), value, reason: source.to_string() }
@@ -163,7 +163,7 @@ fn of_value(parameter: &str, StepValue { value, .. }: StepValue<'_>, error: Scen
 }
 
 /// Returns the error of a step.
-fn of_step(error: StepError, number: u64) -> CliError {
+fn step_error(error: StepError, number: u64) -> CliError {
     match error {
         StepError::Scenario(source) => CliError::Scenario(source),
         StepError::Film(source) => CliError::TrafficFilm(source),

@@ -14,7 +14,7 @@ use super::CliError;
 use super::args::{FilesArgs, Format, smooth_noting, warn_without_lane_changes};
 use super::help::{examples, heading};
 use super::output::{outln, print_text, write_charts};
-use super::protect::{must_be_folder, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall traffic statistics`.
@@ -41,7 +41,7 @@ pub(super) struct StatisticsArgs {
 pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     let charts = args.plot.as_ref().map(|folder| STATISTICS_CHARTS.map(|name| folder.join(name)));
     for chart in charts.iter().flatten() {
-        protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
+        protect(&files_of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     must_be_folder(args.plot.as_deref())?;
     let files = smooth_noting(&args.data)?;

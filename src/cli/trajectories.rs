@@ -16,7 +16,7 @@ use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::fit::FitText;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
-use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_charts};
+use closecall_report::traffic::paper_charts::{METRICS, criticality_charts};
 use closecall_traffic::atomic::WriteError;
 use serde::Deserialize;
 use serde_json::Value;
@@ -26,7 +26,7 @@ use super::args::{FilesArgs, Format, LanesChoice, ReadArgs, advise, smooth_notin
 use super::argument::Argument;
 use super::help::{examples, heading};
 use super::output::{command_line, during, out, outln, print_text, print_written, reading, warn, write_charts};
-use super::protect::{must_be_folder, must_be_writable, of_trajectories, protect};
+use super::protect::{files_of_trajectories, must_be_folder, must_be_writable, protect};
 use super::reenact::lacks_lane_change;
 use crate::exit_code::ExitCode;
 
@@ -202,7 +202,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
 }
 
 pub(super) fn find_lane_changes(args: &LaneChangesArgs) -> Result<Answer, CliError> {
-    protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--openlabel", args.openlabel.as_deref())])?;
+    protect(&files_of_trajectories(std::slice::from_ref(&args.file)), &[("--openlabel", args.openlabel.as_deref())])?;
     must_be_writable(args.openlabel.as_deref())?;
     let references = args.reference.as_deref().map(read_references).transpose()?;
     let mut tracks = reading(&args.file, || open(&args.file, args.read.options()))?;
@@ -291,9 +291,9 @@ fn print_list(values: impl Iterator<Item = Value>) {
 }
 
 fn judge_file(args: &CriticalityArgs) -> Result<JudgedFile, CliError> {
-    let inputs = of_trajectories(std::slice::from_ref(&args.file));
+    let inputs = files_of_trajectories(std::slice::from_ref(&args.file));
     protect(&inputs, &[("--record", args.record.as_deref()), ("--openlabel", args.openlabel.as_deref())])?;
-    let charts = args.plot.as_ref().map(|folder| CRITICALITY_CHARTS.map(|name| folder.join(name)));
+    let charts = args.plot.as_ref().map(|folder| METRICS.map(|metric| folder.join(format!("{metric}.svg"))));
     for chart in charts.iter().flatten() {
         protect(&inputs, &[("--plot", Some(chart))])?;
     }
@@ -340,7 +340,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 }
 
 pub(super) fn find_fit(args: &FitArgs) -> Result<Answer, CliError> {
-    protect(&of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
+    protect(&files_of_trajectories(&args.data.files), &[("--out", args.output.as_deref())])?;
     must_be_writable(args.output.as_deref())?;
     let files = smooth_noting(&args.data)?;
     let mut fitted = during("fitting distributions".to_owned(), || correlated_in_files(&files, args.seed));

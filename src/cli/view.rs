@@ -23,7 +23,7 @@ use super::CliError;
 use super::explore::{ViewerChoice, explore, export};
 use super::help::{examples, heading};
 use super::output::{outln, print_error};
-use super::protect::{of_campaign, protect};
+use super::protect::{files_of_campaign, protect};
 use super::results::last_results;
 use super::saved::{SavedArgs, refuse_rare};
 use super::view_error::ViewError;
@@ -82,7 +82,7 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
     let is_campaign = campaign.join(MANIFEST).is_file();
     if let Some(path) = &args.export {
         // The page itself is written anew.
-        let inputs = of_campaign(&campaign).into_iter().filter(|input| !input.ends_with(EXPLORER));
+        let inputs = files_of_campaign(&campaign).into_iter().filter(|input| !input.ends_with(EXPLORER));
         protect(&inputs.collect::<Vec<_>>(), &[("--export", Some(path))])?;
         if path.extension().is_none_or(|end| end != "html") || path.starts_with(campaign.join(RECORDINGS)) {
             return Err(CliError::usage(format!(

@@ -57,7 +57,7 @@ pub struct FidelityRate {
     pub events: u64,
     /// The rate by the runs of the full chain.
     pub plain: f64,
-    /// Its exact 95 % interval.
+    /// The exact 95 % interval of that rate.
     pub plain_interval_95: [f64; 2],
     /// The rate of the fast mode, by all of its samples.
     pub fast: f64,
@@ -309,12 +309,12 @@ fn events(saved: &SavedCampaign) -> Result<BTreeMap<String, Events>, FolderError
     let mut events: BTreeMap<String, Events> = BTreeMap::new();
     for record in saved.folder().complete_records()? {
         let record = record?;
-        events.entry(record.scenario.clone()).or_default().insert(record.sample, of_record(&record));
+        events.entry(record.scenario.clone()).or_default().insert(record.sample, events_of_record(&record));
     }
     Ok(events)
 }
 
-fn of_record(record: &Record) -> Option<Vec<bool>> {
+fn events_of_record(record: &Record) -> Option<Vec<bool>> {
     let tallies = record.tallies();
     let mut events: Vec<bool> = tallies.iter().map(|tally| tally.collided).collect::<Option<_>>()?;
     if let [baseline, .., tested] = &tallies[..] {

@@ -163,7 +163,7 @@ impl GateSet {
             return Vec::new();
         }
         let gate = &file.config().gate;
-        let probability = of_config(gate).and_then(|gate| self.weaker_than_probability(&gate));
+        let probability = probability_gate(gate).and_then(|gate| self.weaker_than_probability(&gate));
         let of_file = gate.require.iter().filter_map(|expression| self.weaker_than(expression));
         self.weakened.iter().cloned().chain(of_file).chain(probability).collect()
     }
@@ -192,7 +192,7 @@ impl GateSet {
             return None;
         }
         let of_file = || {
-            let gate = of_config(&file.config().gate)?;
+            let gate = probability_gate(&file.config().gate)?;
             Some(ProbabilitySpec { gate, source: GateSource::Scenario })
         };
         self.probability.clone().or_else(of_file)
@@ -200,7 +200,7 @@ impl GateSet {
 }
 
 /// Returns the gate on the probability of a collision of a file; `None` if it has none.
-fn of_config(gate: &GateConfig) -> Option<ProbabilityGate> {
+fn probability_gate(gate: &GateConfig) -> Option<ProbabilityGate> {
     ProbabilityGate::new(gate.max_probability?, gate.confidence.unwrap_or(ProbabilityGate::CONFIDENCE)).ok()
 }
 

@@ -217,7 +217,7 @@ impl SensitivityPlan {
         let indices = outputs
             .iter()
             .enumerate()
-            .map(|(index, output)| of_output(*output, &design, self.factors.len(), &ran.of(index)));
+            .map(|(index, output)| output_indices(*output, &design, self.factors.len(), &ran.of(index)));
         let indices = indices.collect();
         let Ran { errors, .. } = ran;
         Ok(Some(Decomposition { rows: design.rows(), points, errors, groups, indices }))
@@ -277,7 +277,7 @@ fn scores(screening: &Screening) -> Vec<f64> {
     scores
 }
 
-fn of_output(output: Output, design: &Design, factors: usize, outputs: &[Option<f64>]) -> OutputIndices {
+fn output_indices(output: Output, design: &Design, factors: usize, outputs: &[Option<f64>]) -> OutputIndices {
     let values: Vec<f64> = outputs.iter().flatten().copied().collect();
     OutputIndices {
         output,

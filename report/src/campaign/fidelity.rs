@@ -97,7 +97,7 @@ fn ratios(folder: &Folder) -> BTreeMap<String, f64> {
 }
 
 /// Returns the rates of the campaign of a report, if fast sensors have sharpened them.
-pub(super) fn of_findings(findings: &Findings<'_>) -> Option<Fidelity> {
+pub(super) fn fidelity_of(findings: &Findings<'_>) -> Option<Fidelity> {
     findings.folder.and_then(Fidelity::read)
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::coverage::line;
 use super::ensemble::ensemble_markdown;
-use super::fidelity::{fidelity_markdown, of_findings};
+use super::fidelity::{fidelity_markdown, fidelity_of};
 use super::findings::Findings;
 use super::origins::Origins;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
@@ -67,7 +67,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));
-    if let Some(fidelity) = of_findings(findings) {
+    if let Some(fidelity) = fidelity_of(findings) {
         text.push_str(&fidelity_markdown(&fidelity, cell));
     }
     text.push_str(&ensemble_markdown(findings.summary, findings.manifest));

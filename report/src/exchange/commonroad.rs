@@ -101,7 +101,7 @@ fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Option<Elemen
 }
 
 /// Returns the elements of a state that all kinds of states have.
-fn state(scenario: &Scenario, name: &'static str, (step, state): (usize, &VehicleState)) -> Element {
+fn state(scenario: &Scenario, name: &'static str, step: usize, state: &VehicleState) -> Element {
     let pose = scenario.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
     Element::new(name)
         .child(point(pose.x_m, pose.y_m).within("position"))
@@ -119,7 +119,7 @@ fn obstacle(scenario: &Scenario, motion: &Motion, index: usize) -> Option<Elemen
     };
     let mut states = motion.steps.iter().enumerate().filter_map(|(step, (_, states))| Some((step, states.get(index)?)));
     let with_acceleration = |name, (step, vehicle): (usize, &VehicleState)| {
-        state(scenario, name, (step, vehicle)).child(exact("acceleration", vehicle.acceleration_mps2))
+        state(scenario, name, step, vehicle).child(exact("acceleration", vehicle.acceleration_mps2))
     };
     let initial = with_acceleration("initialState", states.next()?);
     let rectangle = Element::new("rectangle")
@@ -142,7 +142,7 @@ fn obstacle(scenario: &Scenario, motion: &Motion, index: usize) -> Option<Elemen
 fn planning_problem(scenario: &Scenario, motion: &Motion) -> Option<Element> {
     let (_, states) = motion.steps.first()?;
     let start = states.get(scenario.ego)?;
-    let initial = state(scenario, "initialState", (0, start))
+    let initial = state(scenario, "initialState", 0, start)
         .child(exact("yawRate", start.yaw_rate_radps))
         .child(exact("slipAngle", 0));
     let end = motion.steps.len() - 1;

@@ -16,7 +16,7 @@ pub(super) fn deterministic(scenario_file: &str, description: &str, samples: &[P
     }
     let sets = Element::new("ValueSetDistribution").children(sets);
     let inner = sets.within("DeterministicMultiParameterDistribution").within("Deterministic");
-    Some(document(scenario_file, (description, &[]), inner))
+    Some(document(scenario_file, description, &[], inner))
 }
 
 fn value_set(sample: &Parameters) -> Element {
@@ -38,10 +38,10 @@ pub(super) fn stochastic(
     let distributions = config.parameters.0.iter().filter_map(|(name, config)| distribution(name, config));
     let inner =
         Element::new("Stochastic").with("numberOfTestRuns", samples).with("randomSeed", seed).children(distributions);
-    Some(document(scenario_file, (description, unsaid), inner))
+    Some(document(scenario_file, description, unsaid, inner))
 }
 
-fn document(scenario_file: &str, (description, unsaid): (&str, &[String]), inner: Element) -> String {
+fn document(scenario_file: &str, description: &str, unsaid: &[String], inner: Element) -> String {
     let values = Element::new("ParameterValueDistribution")
         .child(Element::new("ScenarioFile").with("filepath", scenario_file))
         .child(inner);

@@ -14,17 +14,17 @@ const BARS: usize = 14;
 /// Returns the charts of a study, with the name of the output of each: of the decomposition if
 /// there is one.
 pub(super) fn charts(study: &Sensitivity) -> io::Result<Vec<(&'static str, String)>> {
-    let chart = |output: &OutputIndices| Ok((output.output.name(), of_effects_on_mean(study, output)?));
+    let chart = |output: &OutputIndices| Ok((output.output.name(), chart_of_effects_on_mean(study, output)?));
     if let Some(decomposition) = &study.decomposition {
         return decomposition.indices.iter().map(chart).collect();
     }
     let effects = |screening: &Screening| {
-        screening.effects.iter().map(|output| Ok((output.output.name(), of_effects(study, output)?))).collect()
+        screening.effects.iter().map(|output| Ok((output.output.name(), chart_of_effects(study, output)?))).collect()
     };
     study.screening.as_ref().map_or_else(|| Ok(Vec::new()), effects)
 }
 
-fn of_effects_on_mean(study: &Sensitivity, output: &OutputIndices) -> io::Result<String> {
+fn chart_of_effects_on_mean(study: &Sensitivity, output: &OutputIndices) -> io::Result<String> {
     // Events are shown in percent.
     let unit = if output.output.is_event() { 100.0 } else { 1.0 };
     let bar = |factor: usize| {
@@ -44,7 +44,7 @@ fn of_effects_on_mean(study: &Sensitivity, output: &OutputIndices) -> io::Result
     tornado(&bars, unit * output.mean.unwrap_or(0.0), TornadoTexts { heads, scale })
 }
 
-fn of_effects(study: &Sensitivity, output: &OutputEffects) -> io::Result<String> {
+fn chart_of_effects(study: &Sensitivity, output: &OutputEffects) -> io::Result<String> {
     let bar = |(factor, effects): (&Factor, &Effects)| {
         let mu_star = effects.mu_star.filter(|mu_star| mu_star.value > 0.0)?;
         Some(TornadoBar {

@@ -2,6 +2,7 @@
 //! shares of critical lane changes to the left and to the right.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use closecall_recorded::criticality::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
@@ -22,16 +23,11 @@ const BARS: usize = 20;
 /// Half of the width of a bar of shares, as a share of the distance between two metrics (-).
 const HALF_BAR: f64 = 0.16;
 
-/// Returns the names of the metrics.
-pub(super) const METRICS: [&str; 7] =
-    ["distance_m", "speed_mps", "a_lon_mps2", "a_lat_mps2", "thw_s", "dce_m", "ttce_s"];
-
-/// Names of the charts' files: one per metric.
-pub const CRITICALITY_CHARTS: [&str; 7] =
-    ["distance_m.svg", "speed_mps.svg", "a_lon_mps2.svg", "a_lat_mps2.svg", "thw_s.svg", "dce_m.svg", "ttce_s.svg"];
+/// Names of the metrics that have a chart each.
+pub const METRICS: [&str; 7] = ["distance_m", "speed_mps", "a_lon_mps2", "a_lat_mps2", "thw_s", "dce_m", "ttce_s"];
 
 /// Draws how often the values of each metric occur among complete lane changes, with the
-/// thresholds. The charts (SVG) are in the order of [`CRITICALITY_CHARTS`].
+/// thresholds. The charts (SVG) are in the order of [`METRICS`].
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
@@ -42,22 +38,41 @@ pub fn criticality_charts(
     METRICS.iter().map(|metric| histogram(changes, metric, speed_limit_mps)).collect()
 }
 
-/// Returns the value of a metric beyond which it is critical.
-fn threshold(metric: &str, speed_limit_mps: Option<f64>) -> f64 {
-    match metric {
-        "distance_m" => CRITICAL_DISTANCE_M,
-        "speed_mps" => CRITICAL_SPEED_FACTOR * speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS),
-        "a_lon_mps2" => CRITICAL_A_LON_MPS2,
-        "a_lat_mps2" => CRITICAL_A_LAT_MPS2,
-        "thw_s" => CRITICAL_THW_S,
-        "dce_m" => CRITICAL_DCE_M,
-        _ => CRITICAL_TTCE_S,
+/// The values of a metric that are critical.
+#[derive(Clone, Copy)]
+enum Critical {
+    Above(f64),
+    Below(f64),
+}
+
+impl Critical {
+    fn threshold(self) -> f64 {
+        match self {
+            Self::Above(threshold) | Self::Below(threshold) => threshold,
+        }
     }
 }
 
-/// Returns true if large values of a metric are critical.
-fn is_above(metric: &str) -> bool {
-    matches!(metric, "speed_mps" | "a_lon_mps2" | "a_lat_mps2")
+impl fmt::Display for Critical {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Above(threshold) => write!(f, "critical above {threshold:.1}"),
+            Self::Below(threshold) => write!(f, "critical below {threshold:.1}"),
+        }
+    }
+}
+
+/// Returns the critical values of a metric.
+fn critical(metric: &str, speed_limit_mps: Option<f64>) -> Critical {
+    match metric {
+        "distance_m" => Critical::Below(CRITICAL_DISTANCE_M),
+        "speed_mps" => Critical::Above(CRITICAL_SPEED_FACTOR * speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS)),
+        "a_lon_mps2" => Critical::Above(CRITICAL_A_LON_MPS2),
+        "a_lat_mps2" => Critical::Above(CRITICAL_A_LAT_MPS2),
+        "thw_s" => Critical::Below(CRITICAL_THW_S),
+        "dce_m" => Critical::Below(CRITICAL_DCE_M),
+        _ => Critical::Below(CRITICAL_TTCE_S),
+    }
 }
 
 /// Draws how often the values of a metric occur among complete lane changes, with the threshold
@@ -75,18 +90,19 @@ pub(super) fn histogram(
     };
     let complete = changes.iter().filter(|change| change.lane_change.complete);
     let values: Vec<f64> = complete.filter_map(value_of).filter(|value| value.is_finite()).collect();
-    let limit = threshold(metric, speed_limit_mps);
-    let title = format!("{} of {} complete lane changes", labelled(metric), values.len());
-    file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), &values, limit, is_above(metric)))
+    let name = labelled(metric);
+    let title = format!("{name} of {} complete lane changes", values.len());
+    let critical = critical(metric, speed_limit_mps);
+    file(&title, |canvas| draw_histogram(canvas, &title, &name, &values, critical))
 }
 
-/// Returns the number of values in each bar. Bar 0 begins at the threshold, so no bar holds
-/// critical and other values.
-fn bars(values: &[f64], limit: f64, width: f64) -> BTreeMap<i32, u32> {
+/// Returns the number of values in each bar. Bar 0 begins at the threshold, so no bar holds both
+/// critical values and others.
+fn bars(values: &[f64], threshold: f64, width: f64) -> BTreeMap<i32, u32> {
     let mut bars = BTreeMap::new();
     for value in values {
         #[expect(clippy::cast_possible_truncation, reason = "a small whole number")]
-        let bar = ((value - limit) / width).floor() as i32;
+        let bar = ((value - threshold) / width).floor() as i32;
         *bars.entry(bar).or_default() += 1;
     }
     bars
@@ -99,22 +115,22 @@ fn whole_number_axis(name: &str, end: f64) -> ChartAxis<'_> {
     ChartAxis { name, range: 0.0..end, labels: COUNT_LABELS, text: Box::new(text), has_grid: true }
 }
 
-fn draw_histogram(canvas: &Canvas<'_>, title: &str, name: &str, values: &[f64], limit: f64, is_above: bool) -> Drawn {
-    let side = if is_above { "above" } else { "below" };
-    let x = number_axis(name, range(values.iter().copied().chain([limit]), Some(0.0)));
+fn draw_histogram(canvas: &Canvas<'_>, title: &str, name: &str, values: &[f64], critical: Critical) -> Drawn {
+    let threshold = critical.threshold();
+    let x = number_axis(name, range(values.iter().copied().chain([threshold]), Some(0.0)));
     let (start, width) = (x.range.start, (x.range.end - x.range.start) / BARS as f64);
-    let bars = bars(values, limit, width);
+    let bars = bars(values, threshold, width);
     let largest = bars.values().copied().max().unwrap_or(0);
     let y = whole_number_axis("lane changes", (1.1 * f64::from(largest)).max(1.0));
     let mut plot = axes(canvas, Some(title), &x, &y)?;
     plot.draw_series(bars.iter().map(|(bar, count)| {
-        let left = limit + f64::from(*bar) * width;
+        let left = threshold + f64::from(*bar) * width;
         let corners = [(left.max(start), 0.0), (left + width, f64::from(*count))];
         Rectangle::new(corners, series_colour(0).mix(0.6).filled())
     }))?;
-    let line = [(limit, 0.0), (limit, y.range.end)];
+    let line = [(threshold, 0.0), (threshold, y.range.end)];
     plot.draw_series(DashedLineSeries::new(line, 6, 4, series_colour(1).stroke_width(2)))?
-        .label(format!("critical {side} {limit:.1}"))
+        .label(critical.to_string())
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], series_colour(1).stroke_width(2)));
     plot.configure_series_labels()
         .position(SeriesLabelPosition::UpperRight)
@@ -145,10 +161,12 @@ fn draw_shares(canvas: &Canvas<'_>, title: &str, changes: &[CriticalLaneChange])
     let mut plot = axes(canvas, Some(title), &x, &y)?;
     for (index, side) in [Side::Left, Side::Right].into_iter().enumerate() {
         let is_on = |change: &&CriticalLaneChange| change.lane_change.direction == side;
-        let of_side: Vec<CriticalLaneChange> = changes.iter().filter(is_on).cloned().collect();
-        let side_shares = shares(&of_side, Counted::Complete);
+        let to_side: Vec<CriticalLaneChange> = changes.iter().filter(is_on).cloned().collect();
+        let side_shares = shares(&to_side, Counted::Complete);
         let colour = series_colour(index);
-        let centre = |metric: usize| metric as f64 + (2.0 * index as f64 - 1.0) * HALF_BAR;
+        // Two bars stand side by side: the left one for lane changes to the left.
+        let offset = if side == Side::Left { -HALF_BAR } else { HALF_BAR };
+        let centre = |metric: usize| metric as f64 + offset;
         let bars = side_shares.metrics.iter().enumerate().filter_map(|(metric, share)| {
             let corners = [(centre(metric) - HALF_BAR, 0.0), (centre(metric) + HALF_BAR, 100.0 * share.share?)];
             Some(Rectangle::new(corners, colour.mix(0.6).filled()))
@@ -172,7 +190,7 @@ fn draw_shares(canvas: &Canvas<'_>, title: &str, changes: &[CriticalLaneChange])
         .draw()
 }
 
-/// Returns the name of the metric at `x`; empty if `x` is between two metrics.
+/// Returns the name of the metric at `x`, without its unit; empty if `x` is between two metrics.
 fn name_at(x: f64) -> String {
     let nearest = x.round();
     let is_middle = (x - nearest).abs() < 1e-9 && nearest >= 0.0;

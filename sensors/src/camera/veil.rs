@@ -62,17 +62,17 @@ impl Veil {
 impl Frame {
     /// Adds the glare of a fault of the camera. `scene` is the scene that the image shows.
     pub fn add_glare(&mut self, fault: &CameraFault, scene: &Scene<'_>) {
-        let sun = of_sun(fault.sun_glare, &self.lens, &self.light);
+        let sun = sun_veil(fault.sun_glare, &self.lens, &self.light);
         let beams = nearest_behind(scene)
             .filter(|_| fault.main_beam_glare > 0.0 && self.light.is_dark())
-            .map(|vehicle| of_main_beams(fault.main_beam_glare, scene, vehicle, &self.lens, &self.light));
+            .map(|vehicle| main_beam_veil(fault.main_beam_glare, scene, vehicle, &self.lens, &self.light));
         self.lists.veils.extend(sun.into_iter().chain(beams.into_iter().flatten()));
     }
 }
 
 /// Returns the veil of the sun; `None` if it does not shine into the lens.
 #[expect(clippy::cast_possible_truncation, reason = "radiance needs no more than single precision")]
-fn of_sun(strength: f64, lens: &Lens, light: &Illumination) -> Option<Veil> {
+fn sun_veil(strength: f64, lens: &Lens, light: &Illumination) -> Option<Veil> {
     let [.., depth] = lens.direction_in_camera(light.to_sun.map(f64::from));
     (strength > 0.0 && light.sun[0] > 0.0 && depth > 0.0).then(|| {
         // A white surface that faces the sun has the radiance E/π. The lens is inclined to the sun.
@@ -83,7 +83,7 @@ fn of_sun(strength: f64, lens: &Lens, light: &Illumination) -> Option<Veil> {
 
 /// Returns the veils of the headlamps of a vehicle whose main beam is on.
 #[expect(clippy::cast_possible_truncation, reason = "radiance needs no more than single precision")]
-fn of_main_beams(
+fn main_beam_veil(
     strength: f64,
     scene: &Scene<'_>,
     vehicle: &SceneVehicle,

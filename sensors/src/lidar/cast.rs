@@ -116,13 +116,13 @@ pub(crate) struct SubRays<S: Simd> {
 
 /// Spreads the values of the sub-rays' columns over the lanes.
 #[inline(always)]
-fn of_columns<S: Simd>(simd: S, [a, b]: [f32; SUBRAY_COLUMNS]) -> f32x8<S> {
+fn spread_columns<S: Simd>(simd: S, [a, b]: [f32; SUBRAY_COLUMNS]) -> f32x8<S> {
     f32x8::load_array(simd, [a, b, a, b, a, b, a, b])
 }
 
 /// Spreads the values of the sub-rays' rows over the lanes.
 #[inline(always)]
-pub(crate) fn of_rows<S: Simd>(simd: S, [a, b, c, d]: [f32; SUBRAY_ROWS]) -> f32x8<S> {
+pub(crate) fn spread_rows<S: Simd>(simd: S, [a, b, c, d]: [f32; SUBRAY_ROWS]) -> f32x8<S> {
     f32x8::load_array(simd, [a, a, b, b, c, c, d, d])
 }
 
@@ -133,9 +133,9 @@ impl<S: Simd> SubRays<S> {
         let group = elevation.group;
         Self {
             simd,
-            cos: of_columns(simd, column.cos[group]),
-            sin: of_columns(simd, column.sin[group]),
-            tan: of_rows(simd, elevation.tan),
+            cos: spread_columns(simd, column.cos[group]),
+            sin: spread_columns(simd, column.sin[group]),
+            tan: spread_rows(simd, elevation.tan),
         }
     }
 

@@ -9,7 +9,7 @@ use std::ops::Mul;
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, u32x8};
 
-use super::cast::{BeamHits, of_rows};
+use super::cast::{BeamHits, spread_rows};
 use super::pattern::{Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::power::LinkBudget;
 use super::targets::Face;
@@ -84,7 +84,7 @@ impl Echoes {
                 f32x8::load_array(simd, hits.face.map(|face| faces[last.min(face as usize)].strength_m))
             }
         };
-        let per_range = inverse * of_rows(simd, elevation.cos);
+        let per_range = inverse * spread_rows(simd, elevation.cos);
         let range_m = f32x8::splat(simd, 1.0) / per_range;
         let power = received_power(per_range, strength_m * (SHARE * link.gain_m2));
         // A sub-ray that hits nothing has an infinite range, and no power.

@@ -31,15 +31,15 @@ const fn spec(key: &'static str, min: f64, max: f64) -> ParameterSpec {
     ParameterSpec { key, min, max, is_of_traffic: false }
 }
 
-const fn of_traffic(key: &'static str, min: f64, max: f64) -> ParameterSpec {
+const fn traffic_parameter(key: &'static str, min: f64, max: f64) -> ParameterSpec {
     ParameterSpec { key, min, max, is_of_traffic: true }
 }
 
 /// Parameters of the Intelligent Driver Model. The ranges are limits of the search.
 const IDM: [ParameterSpec; 5] = [
-    of_traffic("desired-speed-mps", 8.0, 45.0),
-    of_traffic("time-gap-s", 0.1, 4.0),
-    of_traffic("standstill-gap-m", 0.1, 10.0),
+    traffic_parameter("desired-speed-mps", 8.0, 45.0),
+    traffic_parameter("time-gap-s", 0.1, 4.0),
+    traffic_parameter("standstill-gap-m", 0.1, 10.0),
     spec("acceleration-mps2", 0.1, 6.0),
     spec("comfortable-braking-mps2", 0.1, 6.0),
 ];
@@ -47,9 +47,9 @@ const IDM: [ParameterSpec; 5] = [
 /// Parameters of the Wiedemann 99 model. The ranges are limits of the search, after the open tool
 /// PvcTools.
 const WIEDEMANN_99: [ParameterSpec; 11] = [
-    of_traffic("desired-speed-mps", 8.0, 45.0),
-    of_traffic("cc0-m", 0.5, 10.0),
-    of_traffic("cc1-s", 0.1, 3.0),
+    traffic_parameter("desired-speed-mps", 8.0, 45.0),
+    traffic_parameter("cc0-m", 0.5, 10.0),
+    traffic_parameter("cc1-s", 0.1, 3.0),
     spec("cc2-m", 0.0, 15.0),
     spec("cc3-s", -30.0, 0.0),
     spec("cc4-mps", -2.0, 0.0),

@@ -41,7 +41,7 @@ impl ControllerFactory for CarefulEgo {
 /// A vehicle of a collision.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Party {
-    /// Its name.
+    /// The name.
     pub actor: ActorId,
     /// The side that was struck.
     pub side: BoxSide,
@@ -151,7 +151,7 @@ pub fn attribute(case: &Case, settings: &[Setting]) -> Result<(Outcome, Option<A
     let Some(collision) = outcome.collisions.first() else { return Ok((outcome, None)) };
     let as_ego = careful_ego_avoids(&scenario, case.key());
     let attribution = avoidable(collision, &scenario, case.key(), &trace.states, as_ego)
-        .map(|avoidable| of_collision(collision, &outcome, trace.ego_state, avoidable));
+        .map(|avoidable| attribution_of(collision, &outcome, trace.ego_state, avoidable));
     Ok((outcome, attribution))
 }
 
@@ -191,7 +191,7 @@ pub(super) fn avoidable(
     })
 }
 
-fn of_collision(collision: &Collision, outcome: &Outcome, ego_state: EgoState, avoidable: Avoidable) -> Attribution {
+fn attribution_of(collision: &Collision, outcome: &Outcome, ego_state: EgoState, avoidable: Avoidable) -> Attribution {
     let roles = collision.roles();
     let party = |role: usize| Party { actor: collision.between[role].clone(), side: collision.struck_side[role] };
     Attribution {

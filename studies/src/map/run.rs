@@ -171,7 +171,7 @@ fn leaves_grid(setting: &Setting) -> Result<(), MapError> {
 }
 
 /// Returns the error of a point, which names the first parameter of the grid that it depends on.
-fn of_grid(error: ScenarioError) -> MapError {
+fn grid_error(error: ScenarioError) -> MapError {
     if let ScenarioError::Value { source, at, .. } = &error
         && let Some(parameter) = GRID_PARAMETERS.into_iter().find(|name| at.contains(&format!("{name} = ")))
     {
@@ -207,7 +207,7 @@ impl Cell {
         ];
         let named = |(name, value)| Some((ParameterName::new(name)?, Value::Number(value)));
         let parameters: Parameters = values.into_iter().filter_map(named).collect();
-        let scenario = file.concrete(&parameters).map_err(of_grid)?;
+        let scenario = file.concrete(&parameters).map_err(grid_error)?;
         let CheckedDriver::Ego(ego) = &scenario.actors[scenario.ego].driver else {
             return Err(self.failed(SampleError::Panic { message: "the map has no ego".to_owned() }));
         };

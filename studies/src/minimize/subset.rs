@@ -22,7 +22,7 @@ pub(super) struct Found {
 /// values. Of several sets of the same size, the one that is nearest to nominal is returned.
 pub(super) fn fewest(trial: &Trial<'_>) -> Found {
     for size in 0..=TRIED.min(trial.differing.len()) {
-        if let Some(names) = of_size(trial, size) {
+        if let Some(names) = failing_set(trial, size) {
             return Found { names, is_smallest: true };
         }
     }
@@ -33,7 +33,7 @@ pub(super) fn fewest(trial: &Trial<'_>) -> Found {
 
 /// Returns the failing set of `size` parameters that is nearest to nominal; `None` if no such set
 /// fails.
-fn of_size(trial: &Trial<'_>, size: usize) -> Option<Vec<ParameterName>> {
+fn failing_set(trial: &Trial<'_>, size: usize) -> Option<Vec<ParameterName>> {
     let mut sets = sets(&trial.differing, size);
     sets.sort_by(|a, b| distance(trial, a).total_cmp(&distance(trial, b)));
     let fails = |set: &&Vec<ParameterName>| trial.fails(&trial.with(set));

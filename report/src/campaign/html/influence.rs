@@ -30,11 +30,11 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
             "less the share that chance puts there (first order). Grey: its interval reaches 0. `closecall study sensitivity` runs a design of its "
             "own for interactions, and for what the scenario does not sample."
         }
-        @for event in &events { (of_event(event)?) }
+        @for event in &events { (event_influence(event)?) }
     })
 }
 
-fn of_event(event: &EventInfluence) -> io::Result<Markup> {
+fn event_influence(event: &EventInfluence) -> io::Result<Markup> {
     let title = format!("{}: {} of {}", event.event.title(), event.events, event.samples);
     let Some(parameters) = &event.parameters else {
         return Ok(html! { p { strong { (title) } ": " (FEW_EVENTS) "." } });
