@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use super::gate::{GateSource, OpenReason, Standing, undecided};
 use super::ledger::{ArmCounts, Inference};
+use closecall_scenarios::criteria::GateConfig;
 use closecall_traffic::statistics::binomial::at_most;
 pub use closecall_traffic::statistics::format::percent;
 use closecall_traffic::statistics::needed;
@@ -49,7 +50,7 @@ pub enum GateError {
 
 impl ProbabilityGate {
     /// Default confidence (-).
-    pub const CONFIDENCE: f64 = 0.95;
+    pub const CONFIDENCE: f64 = GateConfig::CONFIDENCE;
 
     /// Returns a gate with the largest probability `max`, between 0 and 1, and a confidence between
     /// ½ and 1.

@@ -1,7 +1,7 @@
 //! Changes single values of a scenario from the command line: `--set key=value`.
 //!
-//! A setting changes the text of the scenario. All later steps (checking, hashing, the campaign's
-//! manifest, replay) thus work on one text and need no special case.
+//! A setting changes the text of the scenario before the text is checked, hashed, or stored in the
+//! campaign's manifest. All later steps thus work on one text and need no special case.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,9 +12,9 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, Formatted, InlineTable, Item,
 /// One `key=value` from the command line.
 ///
 /// The key is a path of keys joined by dots. An element of a list is identified by its index, from
-/// 0, or by its `id` or `name` (`actor.2.…`, `actor[2].…`, `actor.rear.…`). A key without a dot that
-/// is the name of a parameter fixes that parameter: `brake-mps2=6`. The value replaces a whole list,
-/// a whole element of a list, or a single value.
+/// 0, or by its `id` or `name` (`actor.2.…`, `actor[2].…`, `actor.rear.…`). A key without a dot
+/// that is the name of a parameter fixes that parameter: `brake-mps2=6`. The value replaces a whole
+/// list, a whole element of a list, or a single value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     key: Vec<String>,
@@ -33,10 +33,10 @@ pub enum SettingError {
     /// The text is not of the form key=value.
     #[error("`{text}` is not of the form key=value")]
     Form {
-        /// The text found.
+        /// The text of the setting.
         text: String,
     },
-    /// The value begins like a list, a table or a quoted text, and is none.
+    /// The value begins like a list, a table or a quoted text, but is not valid TOML.
     #[error(
         "the value of `{key}` is no TOML: {message}: lists are written [1, 2], tables {{key = 1}}, texts in quotes"
     )]
@@ -51,7 +51,7 @@ pub enum SettingError {
     NotFinite {
         /// The key.
         key: String,
-        /// The value found.
+        /// The value of the setting.
         value: String,
     },
     /// The scenario has no such key.
@@ -134,7 +134,7 @@ impl FromStr for Setting {
 }
 
 impl Setting {
-    /// Returns the first two settings that contradict each other: the later one
+    /// Returns the first pair of settings that contradict each other: the later setting
     /// [undoes](Self::undoes) the earlier one.
     pub fn contradiction(settings: &[Self]) -> Option<[&Self; 2]> {
         settings.iter().enumerate().find_map(|(index, later)| {
@@ -146,10 +146,10 @@ impl Setting {
     /// Sets the values in `document`, one after the other.
     ///
     /// # Errors
-    /// [`SettingError`] for the first setting that cannot be applied, and for two that contradict
-    /// each other in this document alone, in which an id and an index name the same element of a
-    /// list (`actor.rear.…`, `actor.2.…`). Settings that contradict each other in any document are
-    /// the caller's: see [`Self::contradiction`].
+    /// [`SettingError`] for the first setting that cannot be applied, and for two settings that
+    /// contradict each other only in this document: an id and an index name the same element of a
+    /// list (`actor.rear.…`, `actor.2.…`). The caller checks for settings that contradict each other
+    /// in every document: see [`Self::contradiction`].
     pub(super) fn apply_all(settings: &[Self], document: &mut DocumentMut) -> Result<(), SettingError> {
         let mut by_index: Vec<Self> = Vec::new();
         for (index, later) in settings.iter().enumerate() {
@@ -165,7 +165,7 @@ impl Setting {
         Ok(())
     }
 
-    /// Returns the setting with the index of each element of a list that it names by its id.
+    /// Returns the same setting with indices in place of the ids of list elements.
     fn by_index(&self, document: &mut DocumentMut) -> Self {
         let mut key = self.key.clone();
         let mut node = Some(Node::Table(document.as_table_mut()));
@@ -179,11 +179,15 @@ impl Setting {
         Self { key, value: self.value.clone() }
     }
 
-    /// Returns true if nothing is left of an `earlier` setting after this one: it has the same key
-    /// and another value, it replaces the table in which the earlier key is, or it gives a
-    /// parameter that the earlier one fixed a distribution or another value. A part of a table that
-    /// an earlier setting gave, and a value of a parameter whose distribution it gave, are no
-    /// contradiction.
+    /// Returns true if this setting leaves nothing of an `earlier` one:
+    ///
+    /// - Both have the same key and different values.
+    /// - This setting replaces the table that contains the earlier key.
+    /// - The earlier setting fixes a parameter, and this one gives the parameter a distribution or
+    ///   another value.
+    ///
+    /// A setting may refine an earlier one: it may change a part of a table that the earlier
+    /// setting gave, or fix a parameter whose distribution the earlier setting gave.
     pub fn undoes(&self, earlier: &Self) -> bool {
         if self.key == earlier.key {
             return !is_equal(&self.value(), &earlier.value());
@@ -204,8 +208,9 @@ impl Setting {
         replaces_table || gives_distribution
     }
 
-    /// Returns the parameter that the setting fixes, and its value, whichever way it is written. A
-    /// key without a dot may also be a key of the file.
+    /// Returns the parameter that the setting fixes, and the value: of `NAME=…`,
+    /// `parameters.NAME={fixed=…}` or `parameters.NAME.fixed=…`. The key `NAME` may also be a key
+    /// of the file.
     fn fixed(&self) -> Option<(&str, Value)> {
         match &self.key[..] {
             [name] => Some((name.as_str(), self.value())),
@@ -224,42 +229,31 @@ impl Setting {
     /// [`SettingError::NoSuchKey`] if a part of the key other than the last one does not exist.
     pub(super) fn apply(&self, document: &mut DocumentMut) -> Result<(), SettingError> {
         let value = self.value();
-        if let [name] = &self.key[..]
-            && let Some(parameters) = document.get_mut("parameters").and_then(Item::as_table_like_mut)
-            && parameters.contains_key(name)
-        {
-            let fixed = InlineTable::from_iter([("fixed", value)]);
-            parameters.insert(name, Item::Value(Value::InlineTable(fixed)));
-            return Ok(());
-        }
-        if let [name] = &self.key[..]
-            && !document.contains_key(name)
-        {
-            let parameters = document.get("parameters").and_then(Item::as_table_like).map(keys).unwrap_or_default();
-            return Err(self.no_such_key(
-                &format!("`{name}`"),
-                format!("the parameters {parameters} and the keys {}", keys(document.as_table())),
-            ));
+        if let [name] = &self.key[..] {
+            let parameters = document.get_mut("parameters").and_then(Item::as_table_like_mut);
+            let names = parameters.as_deref().map(keys).unwrap_or_default();
+            if let Some(parameters) = parameters.filter(|parameters| parameters.contains_key(name)) {
+                let fixed = InlineTable::from_iter([("fixed", value)]);
+                parameters.insert(name, Item::Value(Value::InlineTable(fixed)));
+                return Ok(());
+            }
+            if !document.contains_key(name) {
+                let allowed = format!("the parameters {names} and the keys {}", keys(document.as_table()));
+                return Err(self.no_such_key(&format!("`{name}`"), allowed));
+            }
         }
         let Some((last, parents)) = self.key.split_last() else { return Ok(()) };
         let mut node = Node::Table(document.as_table_mut());
         for (depth, part) in parents.iter().enumerate() {
-            // Below the first level, a table that the file leaves out is created. Its content is
-            // checked like the rest. A number would be an element of a list.
+            // A table that the file leaves out is created if it lies below the first level. The
+            // check of the scenario covers the new table too.
             let is_optional = depth > 0 || OPTIONAL_TABLES.contains(&part.as_str());
             if let Node::Table(table) = &mut node
                 && is_optional
                 && !table.contains_key(part)
             {
                 if self.key[depth + 1].parse::<usize>().is_ok() {
-                    let list = self.key[..=depth].join(".");
-                    let names = match keys(&**table) {
-                        names if names.is_empty() => "nothing".to_owned(),
-                        names => names,
-                    };
-                    let allowed =
-                        format!("the file has {names} there; if the list exists, `{list}=[…]` gives it whole");
-                    return Err(self.no_such_element(&format!("`{part}`"), allowed));
+                    return Err(self.no_list(&**table, depth));
                 }
                 table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
             }
@@ -313,6 +307,17 @@ impl Setting {
         }
     }
 
+    /// Returns the error for a key whose part at `depth` needs a list that `table` does not have.
+    fn no_list(&self, table: &dyn TableLike, depth: usize) -> SettingError {
+        let list = self.key[..=depth].join(".");
+        let names = match keys(table) {
+            names if names.is_empty() => "nothing".to_owned(),
+            names => names,
+        };
+        let allowed = format!("the file has {names} there; if the list exists, `{list}=[…]` gives it whole");
+        self.no_such_element(&format!("`{}`", self.key[depth]), allowed)
+    }
+
     fn no_such_element(&self, part: &str, allowed: String) -> SettingError {
         SettingError::NoSuchElement { key: self.key.join("."), part: part.to_owned(), allowed }
     }
@@ -327,7 +332,7 @@ impl Setting {
     }
 }
 
-/// A part of a document that a part of a key may lead into.
+/// A place in a document that the parts of a key lead to.
 enum Node<'a> {
     /// A table in either of the two forms of TOML.
     Table(&'a mut dyn TableLike),
@@ -335,7 +340,7 @@ enum Node<'a> {
     Tables(&'a mut ArrayOfTables),
     /// A list, written `[…]`.
     Array(&'a mut Array),
-    /// A value that nothing is below.
+    /// A single value. No part of a key leads further.
     Value,
 }
 
@@ -357,7 +362,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Returns what a part of a key names, if there is such a key or element.
+    /// Returns the place that the next part of a key leads to, if there is such a key or element.
     fn child(self, part: &str) -> Option<Self> {
         let index = self.index_of(part);
         match self {

@@ -3,12 +3,13 @@
 use closecall_traffic::{KeyPath, Segment};
 use toml_edit::{Document, Item, Table, TableLike, Value};
 
-/// The text of a file, in which lines are counted, and the text that was made of it.
+/// The text of a file, in which lines are counted, and the whole text of the scenario: with the
+/// keys of the file's base, and with the settings of the command line.
 #[derive(Clone, Debug)]
 pub(super) struct Origin {
     /// The text of the file.
     file: String,
-    /// The text with the keys of its base and the settings; `None` if the file has neither.
+    /// The whole text; `None` if it is the text of the file.
     whole: Option<String>,
 }
 
@@ -17,13 +18,14 @@ impl Origin {
         Self { file: file.to_owned(), whole: (file != whole).then(|| whole.to_owned()) }
     }
 
-    /// Returns the line, counted from 1, of the deepest part of `path` that the whole text contains.
-    /// Returns `None` if this part is not in the file: its base or a setting has it.
+    /// Returns the line, counted from 1, of the deepest part of `path` that the whole text
+    /// contains. Returns `None` if this part comes from the base or from a setting, and not from
+    /// the file.
     pub(super) fn line_of(&self, path: &KeyPath) -> Option<usize> {
-        let (line, depth) = deepest(&self.file, path)?;
-        let is_in_file =
-            self.whole.as_ref().is_none_or(|whole| deepest(whole, path).is_some_and(|(_, in_whole)| in_whole == depth));
-        is_in_file.then_some(line)
+        let in_file = deepest(&self.file, path)?;
+        let depth_of = |whole: &String| deepest(whole, path).map(|part| part.segments);
+        let is_in_file = self.whole.as_ref().is_none_or(|whole| depth_of(whole) == Some(in_file.segments));
+        is_in_file.then_some(in_file.line)
     }
 
     /// Returns the line, counted from 1, of a byte offset of `text`: the text of the file, or the
@@ -39,43 +41,57 @@ impl Origin {
 /// Returns the line, counted from 1, of the deepest part of `path` that the text contains. Returns
 /// `None` if the text contains no part of it.
 pub(super) fn line_of(text: &str, path: &KeyPath) -> Option<usize> {
-    deepest(text, path).map(|(line, _)| line)
+    deepest(text, path).map(|part| part.line)
 }
 
-/// Returns the line of the deepest part of `path` that the text contains, and the number of its
-/// segments.
-fn deepest(text: &str, path: &KeyPath) -> Option<(usize, usize)> {
+/// The leading segments of a path that a text contains.
+struct PathPart {
+    /// Line of the last segment, counted from 1.
+    line: usize,
+    /// Number of segments.
+    segments: usize,
+}
+
+/// Returns the deepest part of `path` that the text contains.
+fn deepest(text: &str, path: &KeyPath) -> Option<PathPart> {
     let document = Document::parse(text).ok()?;
     let mut node = Node::Item(document.as_item());
-    let mut found = None;
-    for (depth, segment) in path.0.iter().enumerate() {
-        let Some((next, at)) = node.descend(segment) else { break };
-        let offset = at.or(found.map(|(offset, _)| offset));
-        found = offset.map(|offset| (offset, depth + 1));
-        node = next;
+    let (mut last_offset, mut segments) = (None, 0);
+    for segment in &path.0 {
+        let Some((child, offset)) = node.descend(segment) else { break };
+        last_offset = offset.or(last_offset);
+        segments += 1;
+        node = child;
     }
-    found.map(|(offset, depth)| (line_at(text, offset), depth))
+    Some(PathPart { line: line_at(text, last_offset?), segments })
 }
 
 /// Returns the path of the last key or element of a list that begins at a byte offset or before it.
 fn path_at(text: &str, offset: usize) -> KeyPath {
     let Ok(document) = Document::parse(text) else { return KeyPath::default() };
-    let mut last = (0, KeyPath::default());
-    collect(&Node::Item(document.as_item()), &KeyPath::default(), offset, &mut last);
-    last.1
+    let mut last = Located { offset: 0, path: KeyPath::default() };
+    find_last(&Node::Item(document.as_item()), &KeyPath::default(), offset, &mut last);
+    last.path
 }
 
-/// Takes over each path at or below `path` that begins before `limit`, and not before the last one.
-fn collect(node: &Node<'_>, path: &KeyPath, limit: usize, last: &mut (usize, KeyPath)) {
+/// A path, and the byte offset at which its last segment begins.
+struct Located {
+    offset: usize,
+    path: KeyPath,
+}
+
+/// Replaces `last` by each path below `path` that begins at the offset of `last` or behind it, but
+/// not behind `limit`.
+fn find_last(node: &Node<'_>, path: &KeyPath, limit: usize, last: &mut Located) {
     for segment in node.segments() {
-        let Some((child, at)) = node.descend(&segment) else { continue };
-        let inner = KeyPath(path.0.iter().cloned().chain([segment]).collect());
+        let Some((child, key_offset)) = node.descend(&segment) else { continue };
+        let child_path = KeyPath(path.0.iter().cloned().chain([segment]).collect());
         // The header of a table begins before its key.
-        let begin = child.header().or(at);
-        if let Some(begin) = begin.filter(|begin| (last.0..=limit).contains(begin)) {
-            *last = (begin, inner.clone());
+        let offset = child.header().or(key_offset);
+        if let Some(offset) = offset.filter(|offset| (last.offset..=limit).contains(offset)) {
+            *last = Located { offset, path: child_path.clone() };
         }
-        collect(&child, &inner, limit, last);
+        find_last(&child, &child_path, limit, last);
     }
 }
 
@@ -97,9 +113,9 @@ impl<'a> Node<'a> {
     fn descend(&self, segment: &Segment) -> Option<(Self, Option<usize>)> {
         match segment {
             Segment::Key(key) => {
-                let (found_key, item) = self.table()?.get_key_value(key)?;
-                let at = found_key.span().or_else(|| item.span()).map(|span| span.start);
-                Some((Self::Item(item), at))
+                let (key, item) = self.table()?.get_key_value(key)?;
+                let offset = key.span().or_else(|| item.span()).map(|span| span.start);
+                Some((Self::Item(item), offset))
             }
             Segment::Index(index) => self.element(*index),
         }

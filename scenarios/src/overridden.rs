@@ -1,40 +1,37 @@
 //! Settings of the command line that weaken the criteria of a scenario.
 //!
-//! `--set` may change every value. If it removes a check, moves its bound to the easier side, or
-//! asks for less to happen, the judged scenario differs from the scenario of the file. The text
-//! then names the weakened demands, under the key `overridden`, and a saved campaign, a part of it
-//! and a replay know them as well.
+//! `--set` may change every value. If a setting removes a check, moves its bound to the easier
+//! side, or asks for less to happen, the judged scenario differs from the scenario of the file. The
+//! text of the scenario then lists the weakened criteria under the key `overridden`. A saved
+//! campaign, a part of a campaign and a replay keep the text, and so the list.
 
 use super::ScenarioConfig;
 use crate::coverage::{Bin, CoverageConfig};
 use crate::criteria::{Expression, GateConfig};
 
-/// The key of the text that names the weakened demands.
+/// The key under which the text lists the weakened criteria.
 pub(super) const KEY: &str = "overridden";
 
-/// Confidence of the bound of a probability in a file that names none, as of the gate (-).
-const CONFIDENCE: f64 = 0.95;
-
-/// The weakening of what the samples are to cover. It counts if a gate asks for coverage: one of the
-/// scenario file, of a project file, or of the command line.
+/// The entry for a weakened coverage plan. It matters only if a gate asks for coverage, in the
+/// scenario file, in a project file or on the command line.
 pub const COVERAGE: &str = "what is to be covered";
 
-/// Returns what `after` demands less than `before`.
+/// Returns the criteria of `before` that `after` weakens, in words.
 pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<String> {
     let mut weakened = before.overridden.clone();
-    for (mark, asked) in &before.checks {
-        let kept = after.checks.get(mark).map_or(&[][..], Vec::as_slice);
-        let is_kept = |old: &Expression| kept.iter().any(|new| new.is_as_strict_as(old));
-        weakened.extend(asked.iter().filter(|old| !is_kept(old)).map(|old| format!("{mark}: {old}")));
+    for (requirement, checks) in &before.checks {
+        let new_checks = after.checks.get(requirement).map_or(&[][..], Vec::as_slice);
+        let is_kept = |old: &Expression| new_checks.iter().any(|new| new.is_as_strict_as(old));
+        weakened.extend(checks.iter().filter(|old| !is_kept(old)).map(|old| format!("{requirement}: {old}")));
     }
     let is_gate_kept = |old: &&Expression| after.gate.require.iter().any(|new| new.is_as_strict_as(old));
     weakened.extend(before.gate.require.iter().filter(|old| !is_gate_kept(old)).map(|old| format!("gate {old}")));
     weakened.extend(weaker_probability(&before.gate, &after.gate));
-    let requirements = before.requirements.iter().filter(|mark| !after.requirements.contains(mark));
-    weakened.extend(requirements.map(|mark| format!("requirement {mark}")));
+    let requirements = before.requirements.iter().filter(|requirement| !after.requirements.contains(requirement));
+    weakened.extend(requirements.map(|requirement| format!("requirement {requirement}")));
     let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
     weakened.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
-    // A share that is not a number is weaker than any.
+    // A share that is NaN is weaker than any number, so the comparison must fail for NaN.
     let is_share_kept = after.expects_share >= before.expects_share || before.expects.is_empty();
     weakened.extend((!is_share_kept).then(|| format!("expects-share {}", before.expects_share)));
     let is_named = weakened.iter().any(|weakening| weakening == COVERAGE);
@@ -47,8 +44,8 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     weakened
 }
 
-/// Returns what the samples are to cover: the table, and the bins of its items, which follow from
-/// the labels of the parameters. An empty table asks for nothing.
+/// Returns what the samples are to cover: the table, and the bins of its items. The bins also
+/// depend on the labels of the parameters. Returns `None` for an empty table.
 fn covered(config: &ScenarioConfig) -> Option<(&CoverageConfig, Vec<Vec<Bin>>)> {
     let bins = || {
         let space = config.parameters.check().ok()?;
@@ -58,11 +55,11 @@ fn covered(config: &ScenarioConfig) -> Option<(&CoverageConfig, Vec<Vec<Bin>>)> 
     (!config.coverage.is_empty()).then(|| (&config.coverage, bins().unwrap_or_default()))
 }
 
-/// Returns the bound of the probability of a collision if `after` bounds it less, or with less
-/// confidence.
+/// Returns the bound of `before` on the probability of a collision if the bound of `after` is
+/// higher, absent, or of lower confidence.
 fn weaker_probability(before: &GateConfig, after: &GateConfig) -> Option<String> {
     let max = before.max_probability?;
-    let confidence = |gate: &GateConfig| gate.confidence.unwrap_or(CONFIDENCE);
+    let confidence = |gate: &GateConfig| gate.confidence.unwrap_or(GateConfig::CONFIDENCE);
     let is_kept = after.max_probability.is_some_and(|new| new <= max) && confidence(after) >= confidence(before);
     (!is_kept).then(|| format!("gate max-probability {max}"))
 }

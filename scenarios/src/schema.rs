@@ -14,16 +14,17 @@ use toml::Table;
 
 use super::{SCHEMA_VERSION, ScenarioConfig, ScenarioError, ScenarioFile};
 
+/// A scenario that uses every key.
 const EVERY_KEY: &str = include_str!("../../docs/reference/scenario/every-key.toml");
-/// The actor of that scenario that follows trajectory data: a file that is not part of the program.
+/// The actor in [`EVERY_KEY`] that follows trajectory data, a file that is not part of the program.
 const RECORDED_ACTOR: &str = "recorded";
-/// The key of a LiDAR that names another file, which is not part of the program either.
+/// The key of a LiDAR that names a file, which is not part of the program either.
 const PATTERN_FILE: &str = "pattern-file";
-/// The key of a pattern that names another file.
+/// The key of a pattern that names a file.
 const BEAMS_FILE: &str = "beams-file";
 /// Larger than every number that a scenario allows.
 const HUGE: f64 = 1e300;
-/// Bound of a quantity that may have any value: it is not written.
+/// A bound of this size or larger is left out of the schema: the quantity may have any value.
 const UNBOUNDED: f64 = 1e12;
 /// The pattern of names.
 const NAME_PATTERN: &str = "^[a-z][a-z0-9-]*$";
@@ -32,8 +33,8 @@ const SCENARIO_PATTERN: &str = "^[a-z][a-z0-9-]*(@[a-z][a-z0-9-]*)?$";
 
 /// Returns the JSON Schema of scenario files.
 ///
-/// Besides keys and types it states the range of each number that the check of a scenario limits
-/// for itself. Rules between several keys are not part of it.
+/// The schema states keys, types, and the range of each number whose limits do not depend on other
+/// keys. Rules between several keys are not part of the schema.
 pub fn strict_schema() -> Value {
     let mut schema = schemars::schema_for!(ScenarioConfig).to_value();
     for (pointer, range) in ranges(&schema) {
@@ -47,28 +48,28 @@ pub fn strict_schema() -> Value {
             }
         }
     }
-    let mut put = |pointer: &str, key: &str, value: Value| {
+    let mut insert = |pointer: &str, key: &str, value: Value| {
         if let Some(object) = schema.pointer_mut(pointer).and_then(Value::as_object_mut) {
             object.insert(key.to_owned(), value);
         }
     };
-    put("/properties/schema-version", "const", json!(SCHEMA_VERSION));
-    put("/properties/name", "pattern", json!(SCENARIO_PATTERN));
-    put("/properties/actor", "minItems", json!(1));
-    put("/properties/requirements", "uniqueItems", json!(true));
-    put("/$defs/ActorId", "pattern", json!(NAME_PATTERN));
-    put("/$defs/ParameterName", "pattern", json!(NAME_PATTERN));
-    put("/$defs/Lane", "minimum", json!(1));
+    insert("/properties/schema-version", "const", json!(SCHEMA_VERSION));
+    insert("/properties/name", "pattern", json!(SCENARIO_PATTERN));
+    insert("/properties/actor", "minItems", json!(1));
+    insert("/properties/requirements", "uniqueItems", json!(true));
+    insert("/$defs/ActorId", "pattern", json!(NAME_PATTERN));
+    insert("/$defs/ParameterName", "pattern", json!(NAME_PATTERN));
+    insert("/$defs/Lane", "minimum", json!(1));
     let one_of = |keys: &[&str]| {
         let alternatives: Vec<Value> = keys.iter().map(|key| json!({ "required": [key] })).collect();
         json!({ "oneOf": alternatives })
     };
-    put(
+    insert(
         "/$defs/RelativeStartConfig",
         "allOf",
         json!([one_of(&["gap-m", "thw-s", "settled"]), one_of(&["speed-mps", "closing-mps"])]),
     );
-    put("/$defs/TrafficConfig", "allOf", json!([one_of(&["mean-thw-s", "density-per-km"])]));
+    insert("/$defs/TrafficConfig", "allOf", json!([one_of(&["mean-thw-s", "density-per-km"])]));
     schema
 }
 
@@ -84,16 +85,15 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
     for (_, sensor) in sensors.into_iter().flatten() {
         match sensor {
             toml::Value::Table(sensor) => remove_files(sensor),
-            toml::Value::Array(several) => {
-                several.iter_mut().filter_map(toml::Value::as_table_mut).for_each(remove_files);
+            toml::Value::Array(sensors) => {
+                sensors.iter_mut().filter_map(toml::Value::as_table_mut).for_each(remove_files);
             }
             _ => {}
         }
     }
-    // The ranges of distributions depend on the other numbers of the same distribution.
-    let sampled = ["parameters"];
     let mut search = Search { schema, document: &document, ranges: BTreeMap::new() };
-    for (key, value) in document.iter().filter(|(key, _)| !sampled.contains(&key.as_str())) {
+    // The range of a number of a distribution depends on the other numbers, so it is left out.
+    for (key, value) in document.iter().filter(|(key, _)| *key != "parameters") {
         search.visit(&format!("/properties/{key}"), &[Segment::Key(key.clone())], value);
     }
     search.ranges
@@ -107,15 +107,17 @@ fn remove_files(sensor: &mut Table) {
     }
 }
 
+/// The search for the ranges of all numbers of a document.
 struct Search<'a> {
     schema: &'a Value,
     document: &'a Table,
+    /// The ranges by the JSON pointer of the number's schema.
     ranges: BTreeMap<String, Range>,
 }
 
 impl Search<'_> {
-    /// Finds the ranges of `value`, which lies at `path` of the document and has the schema at
-    /// `pointer`.
+    /// Adds the ranges of the numbers in `value`, which lies at `path` of the document and has the
+    /// schema at `pointer`.
     fn visit(&mut self, pointer: &str, path: &[Segment], value: &toml::Value) {
         let within = |segment| path.iter().cloned().chain([segment]).collect::<Vec<_>>();
         match value {
@@ -135,8 +137,8 @@ impl Search<'_> {
             }
             _ if self.is_number(pointer) => {
                 if let Some(range) = allowed(self.document, path) {
-                    let wider = self.ranges.get(pointer).map_or(range, |range_so_far| hull(*range_so_far, range));
-                    self.ranges.insert(pointer.to_owned(), wider);
+                    let ranges = self.ranges.entry(pointer.to_owned()).or_insert(range);
+                    *ranges = hull(*ranges, range);
                 }
             }
             _ => {}
@@ -174,8 +176,8 @@ impl Search<'_> {
     }
 }
 
-/// Returns the range that the check allows at `path`, or `None` if it states none for that key
-/// alone.
+/// Returns the range that the check allows at `path`, or `None` if the check states no range for
+/// that key alone. The check is asked with a number that no range contains.
 fn allowed(document: &Table, path: &[Segment]) -> Option<Range> {
     [-HUGE, HUGE].into_iter().find_map(|number| {
         let mut changed = toml::Value::Table(document.clone());

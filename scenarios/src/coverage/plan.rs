@@ -1,4 +1,14 @@
-//! What is to be covered, checked: items with bins, and targets.
+//! The checked coverage plan of a scenario: what its samples are to cover.
+//!
+//! ```text
+//!  item `closing`: bins 0 to 5, 5 to 10          target `closing`: 2 bins
+//!  item `class`:   bins car, truck, motorcycle   target `class`:   3 bins
+//!  cross `both`:   of the two items              target `both`:    6 bins, all combinations
+//! ```
+//!
+//! An *item* divides the values of a parameter, a measure or an attribute of the operational design
+//! domain into bins. A *target* is an item, or a cross of several items. A bin of a target is
+//! covered by a stated number of samples.
 
 use std::fmt;
 
@@ -13,7 +23,7 @@ use crate::parameters::{ParameterSpace, Part, Strata, volume};
 
 /// Largest number of bins of a target.
 const MOST_BINS: usize = 10_000;
-/// The word of a combination that stands for every bin of an item.
+/// The word of an excluded combination that means every bin of an item.
 const ANY: &str = "*";
 
 /// A range or a label of an item.
@@ -45,11 +55,11 @@ enum Source {
 /// An item with its bins.
 #[derive(Clone, Debug)]
 pub struct Item {
-    /// Its name.
+    /// The name of the item.
     pub name: CoverageName,
-    /// What it bins, in words: the parameter, the measure or the attribute.
+    /// The parameter, measure or attribute that the item divides into bins, in words.
     pub subject: String,
-    /// Its bins.
+    /// The bins.
     pub bins: Vec<Bin>,
     source: Source,
 }
@@ -57,16 +67,16 @@ pub struct Item {
 /// An item or a cross whose bins are to be hit.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// Its name.
+    /// The name of the item or cross.
     pub name: CoverageName,
-    /// The indices of its items.
+    /// The indices of the items in the plan.
     pub items: Vec<usize>,
-    /// Samples by which a bin is covered.
+    /// Number of samples that cover a bin.
     pub at_least: u64,
-    /// For each bin whether it counts, the bins of the last item next to each other.
+    /// Whether each bin is to be covered. The combinations of a cross are in the order in which the
+    /// bin of the last item changes fastest.
     pub counts: Vec<bool>,
-    /// For each bin its probability, if the items are parameters that are not correlated with
-    /// others.
+    /// The probability of each bin, if all items are parameters without a correlation to others.
     pub weights: Option<Vec<f64>>,
 }
 
@@ -85,8 +95,8 @@ impl CoverageConfig {
     /// Checks the table against the parameters of the scenario.
     ///
     /// # Errors
-    /// [`ConfigError`] for a name that does not exist, edges that do not ascend, and what else does
-    /// not fit.
+    /// [`ConfigError`] for a name that does not exist, edges that do not ascend, and other
+    /// contradictions.
     pub(crate) fn check(&self, space: &ParameterSpace) -> Result<CoveragePlan, ConfigError> {
         let mut plan = CoveragePlan::default();
         for (name, config) in &self.item {
@@ -132,8 +142,8 @@ fn at_least(value: Option<u64>) -> Result<u64, ConfigError> {
 }
 
 fn item(name: CoverageName, config: &ItemConfig, space: &ParameterSpace) -> Result<Item, ConfigError> {
-    let of_labels = |labels: &[String]| labels.iter().cloned().map(Bin::Label).collect();
-    let chosen = |all: &[String]| -> Result<Vec<Bin>, ConfigError> {
+    // The bins of labels: the chosen labels, or all of them.
+    let label_bins = |all: &[String]| -> Result<Vec<Bin>, ConfigError> {
         if !config.edges.is_empty() {
             let rule = "only a number has edges, and the bins of labels are the labels".to_owned();
             return Err(ConfigError::new("edges", Problem::Contradiction { other: "labels", rule }));
@@ -147,7 +157,8 @@ fn item(name: CoverageName, config: &ItemConfig, space: &ParameterSpace) -> Resu
                 return Err(ConfigError::new("labels", Problem::Duplicate { value: label.clone() }));
             }
         }
-        Ok(of_labels(if config.labels.is_empty() { all } else { &config.labels }))
+        let labels = if config.labels.is_empty() { all } else { &config.labels };
+        Ok(labels.iter().cloned().map(Bin::Label).collect())
     };
     match (&config.parameter, &config.measure, config.odd) {
         (Some(parameter), None, None) => {
@@ -161,7 +172,7 @@ fn item(name: CoverageName, config: &ItemConfig, space: &ParameterSpace) -> Resu
                 Value::Label(label) if entry.distribution.labels().is_empty() => vec![label],
                 _ => entry.distribution.labels().to_vec(),
             };
-            let bins = if labels.is_empty() { ranges(config)? } else { chosen(&labels)? };
+            let bins = if labels.is_empty() { ranges(config)? } else { label_bins(&labels)? };
             Ok(Item { name, subject: parameter.to_string(), bins, source: Source::Parameter(parameter.clone()) })
         }
         (None, Some(word), None) => {
@@ -170,7 +181,7 @@ fn item(name: CoverageName, config: &ItemConfig, space: &ParameterSpace) -> Resu
                 return Err(ConfigError::new("measure", Problem::UnknownWord { value: word.clone(), allowed }));
             };
             let bins = match measure.kind {
-                MeasureKind::Flag => chosen(&["no", "yes"].map(str::to_owned))?,
+                MeasureKind::Flag => label_bins(&["no", "yes"].map(str::to_owned))?,
                 MeasureKind::Number => ranges(config)?,
             };
             Ok(Item { name, subject: word.clone(), bins, source: Source::Measure(measure) })
@@ -178,7 +189,7 @@ fn item(name: CoverageName, config: &ItemConfig, space: &ParameterSpace) -> Resu
         (None, None, Some(attribute)) => {
             let labels: Vec<String> = attribute.labels().iter().map(|&label| label.to_owned()).collect();
             let subject = attribute.name();
-            Ok(Item { name, subject, bins: chosen(&labels)?, source: Source::Odd(attribute) })
+            Ok(Item { name, subject, bins: label_bins(&labels)?, source: Source::Odd(attribute) })
         }
         (None, None, None) => {
             let needed = "an item bins a `parameter`, a `measure` or an attribute `odd`";
@@ -226,20 +237,26 @@ fn cross(name: CoverageName, config: &CrossConfig, items: &[Item]) -> Result<Tar
         return Err(ConfigError::new("items", Problem::Missing { needed: "a cross has two items or more" }));
     }
     let sizes = indices.iter().map(|&index| items[index].bins.len());
-    let bins = sizes.fold(1_usize, usize::saturating_mul);
-    if bins > MOST_BINS {
-        let problem = Problem::WrongCount { value: bins as u64, allowed: "a number of combinations up to 10000" };
+    let combinations = sizes.fold(1_usize, usize::saturating_mul);
+    if combinations > MOST_BINS {
+        let problem =
+            Problem::WrongCount { value: combinations as u64, allowed: "a number of combinations up to 10000" };
         return Err(ConfigError::new("items", problem));
     }
-    let mut target =
-        Target { name, items: indices, at_least: at_least(config.at_least)?, counts: vec![true; bins], weights: None };
-    for (index, combination) in config.without.iter().enumerate() {
+    let mut target = Target {
+        name,
+        items: indices,
+        at_least: at_least(config.at_least)?,
+        counts: vec![true; combinations],
+        weights: None,
+    };
+    for (index, excluded) in config.without.iter().enumerate() {
         let within = |error: ConfigError| error.within_index(index).within("without");
-        if combination.len() != target.items.len() {
+        if excluded.len() != target.items.len() {
             let needed = "a combination has one bin of each item";
             return Err(within(ConfigError::new("items", Problem::Missing { needed })));
         }
-        for (word, &item) in combination.iter().zip(&target.items) {
+        for (word, &item) in excluded.iter().zip(&target.items) {
             let names: Vec<String> = items[item].bins.iter().map(Bin::to_string).collect();
             if word != ANY && !names.contains(word) {
                 let allowed = format!("{}, {ANY}", names.join(", "));
@@ -247,10 +264,10 @@ fn cross(name: CoverageName, config: &CrossConfig, items: &[Item]) -> Result<Tar
                 return Err(within(ConfigError::new(items[item].name.as_str(), problem)));
             }
         }
-        for bin in 0..bins {
-            let bins = target.bins(bin, items);
-            let is_meant = bins.iter().zip(combination).all(|(bin, word)| word == ANY || bin.to_string() == *word);
-            target.counts[bin] &= !is_meant;
+        for combination in 0..combinations {
+            let mut bins = target.bins(combination, items).into_iter().zip(excluded);
+            let is_excluded = bins.all(|(bin, word)| word == ANY || bin.to_string() == *word);
+            target.counts[combination] &= !is_excluded;
         }
     }
     if !target.counts.contains(&true) {
@@ -294,11 +311,10 @@ impl Item {
             Bin::Label(_) => false,
         })
     }
-}
 
-impl Item {
-    /// Returns the part of the parameter's numbers u that each bin has; `None` for what is no
-    /// parameter, or one that is correlated with another.
+    /// Returns for each bin the interval of the uniform numbers from which the parameter's
+    /// distribution draws a value in that bin. Returns `None` for an item that is not a parameter,
+    /// or whose parameter is correlated with another.
     fn parts(&self, space: &ParameterSpace) -> Option<Vec<Part>> {
         let Source::Parameter(name) = &self.source else { return None };
         let parameter = space.iter().position(|(other, _)| other == name)?;
@@ -314,7 +330,7 @@ impl Item {
                     let end = if index == last { *high } else { high.next_down() };
                     [distribution.cdf(low.next_down())?, distribution.cdf(end)?]
                 }
-                // A label that is never drawn has no part.
+                // The interval of a label that is never drawn is empty.
                 Bin::Label(label) => distribution.interval_of(label).unwrap_or([0.0; 2]),
             };
             Some(Part { parameter, interval })
@@ -324,20 +340,15 @@ impl Item {
 }
 
 impl Target {
-    /// Returns the parts of each bin; `None` if an item has none.
+    /// Returns the parts of each combination, the last item first; `None` if an item has no parts.
     fn parts(&self, items: &[Item], space: &ParameterSpace) -> Option<Vec<Vec<Part>>> {
-        let of_items: Vec<Vec<Part>> =
+        let item_parts: Vec<Vec<Part>> =
             self.items.iter().map(|&item| items[item].parts(space)).collect::<Option<_>>()?;
-        let of_bin = |index: usize| {
-            let mut rest = index;
-            let parts = of_items.iter().rev().map(|parts| {
-                let part = parts[rest % parts.len()];
-                rest /= parts.len();
-                part
-            });
-            parts.collect()
+        let combination_parts = |index: usize| {
+            let bins = self.bin_indices(index, items);
+            item_parts.iter().zip(bins).rev().map(|(parts, bin)| parts[bin]).collect()
         };
-        Some((0..self.counts.len()).map(of_bin).collect())
+        Some((0..self.counts.len()).map(combination_parts).collect())
     }
 
     fn weighted(self, items: &[Item], space: &ParameterSpace) -> Self {
@@ -345,27 +356,28 @@ impl Target {
         Self { weights, ..self }
     }
 
-    /// Returns the bins of the items that the combination with this index stands for.
+    /// Returns the bin of each item in the combination with this index.
     pub fn bins<'a>(&self, index: usize, items: &'a [Item]) -> Vec<&'a Bin> {
+        self.items.iter().zip(self.bin_indices(index, items)).map(|(&item, bin)| &items[item].bins[bin]).collect()
+    }
+
+    /// Returns the index of the bin of each item in the combination with this index: the digits of
+    /// the index, whose last one belongs to the last item.
+    fn bin_indices(&self, index: usize, items: &[Item]) -> Vec<usize> {
         let mut rest = index;
-        let mut bins: Vec<&Bin> = self
-            .items
-            .iter()
-            .rev()
-            .map(|&item| {
-                let bins = &items[item].bins;
-                let bin = &bins[rest % bins.len()];
-                rest /= bins.len();
-                bin
-            })
-            .collect();
-        bins.reverse();
+        let mut bins = vec![0; self.items.len()];
+        for (bin, &item) in bins.iter_mut().zip(&self.items).rev() {
+            let count = items[item].bins.len();
+            *bin = rest % count;
+            rest /= count;
+        }
         bins
     }
 
-    /// Returns the index of a combination, from the index of the bin of each item of the plan.
-    pub fn index(&self, of_items: &[Option<usize>], items: &[Item]) -> Option<usize> {
-        self.items.iter().try_fold(0, |index, &item| Some(index * items[item].bins.len() + of_items[item]?))
+    /// Returns the index of the combination of `bins`, which has the index of the bin of each item
+    /// of the plan. Returns `None` if an item of the target has no bin.
+    pub fn index(&self, bins: &[Option<usize>], items: &[Item]) -> Option<usize> {
+        self.items.iter().try_fold(0, |index, &item| Some(index * items[item].bins.len() + bins[item]?))
     }
 }
 
@@ -434,9 +446,9 @@ without = [["10 to 20", "*"]]
         assert_eq!(bin(f64::NAN), None);
         for index in 0..both.counts.len() {
             let bins = both.bins(index, &plan.items);
-            let of = |item: usize, bin: &Bin| plan.items[item].bins.iter().position(|one| one == bin);
-            let of_items = [of(0, bins[1]), of(1, bins[0]), None, None];
-            assert_eq!(both.index(&of_items, &plan.items), Some(index));
+            let position = |item: usize, bin: &Bin| plan.items[item].bins.iter().position(|other| other == bin);
+            let positions = [position(0, bins[1]), position(1, bins[0]), None, None];
+            assert_eq!(both.index(&positions, &plan.items), Some(index));
         }
         assert_eq!(both.index(&[None, Some(0), None, None], &plan.items), None);
     }

@@ -24,6 +24,9 @@ pub struct GateConfig {
 }
 
 impl GateConfig {
+    /// Confidence of the bound on the probability of a collision if no file or option gives one (-).
+    pub const CONFIDENCE: f64 = 0.95;
+
     /// Returns true if nothing is asked.
     pub fn is_empty(&self) -> bool {
         self.require.is_empty() && self.max_probability.is_none()

@@ -28,15 +28,16 @@ enum Comparison {
 }
 
 impl Comparison {
-    /// All comparisons. One that begins with another one stands before it.
+    /// All comparisons, in the order in which a text is searched for them: `<=` comes before `<`,
+    /// which it contains.
     const ALL: [(&str, Self); 4] =
         [("<=", Self::AtMost), (">=", Self::AtLeast), ("<", Self::Below), (">", Self::Above)];
 
     fn text(self) -> &'static str {
-        Self::ALL.iter().find(|(_, event)| *event == self).map_or("", |(text, _)| text)
+        Self::ALL.iter().find(|(_, comparison)| *comparison == self).map_or("", |(text, _)| text)
     }
 
-    const fn is_small(self) -> bool {
+    const fn is_upper_bound(self) -> bool {
         matches!(self, Self::Below | Self::AtMost)
     }
 }
@@ -62,10 +63,11 @@ impl Event {
         }
     }
 
-    /// Returns why the event happens in every run or in none, whatever happens there: no value of
-    /// the number lies on the other side of the bound. Returns `None` for other events.
-    fn foregone(&self) -> Option<String> {
-        let ((comparison, bound), (measure, _)) = (self.bound?, self.quantity.measure()?);
+    /// Returns a message if the event happens in every sample, or in none: all values that the
+    /// number can have lie on one side of the bound. Returns `None` for other events.
+    fn certainty(&self) -> Option<String> {
+        let (comparison, bound) = self.bound?;
+        let (measure, _) = self.quantity.measure()?;
         let (low, high) = (measure.range.low(), measure.range.high());
         let (always, never) = match comparison {
             Comparison::Below => (bound > high, bound <= low),
@@ -81,7 +83,7 @@ impl Event {
     /// for a flag.
     pub fn excess(&self, value: f64) -> Option<f64> {
         let (comparison, bound) = self.bound?;
-        Some(if comparison.is_small() { bound - value } else { value - bound })
+        Some(if comparison.is_upper_bound() { bound - value } else { value - bound })
     }
 }
 
@@ -170,16 +172,16 @@ fn parse_event(text: &str) -> Result<Event, String> {
         Ok(bound_value) if bound_value.is_finite() => Event { quantity, bound: Some((comparison, bound_value)) },
         _ => return Err(format!("the bound `{}` is not a finite number", bound.trim())),
     };
-    event.foregone().map_or(Ok(event), Err)
+    event.certainty().map_or(Ok(event), Err)
 }
 
-/// The number that leads to an event: of the smallest of something, a smaller one is nearer, else a
-/// larger one.
+/// A measure that guides a search towards an event. If the measure is a minimum (`min_…`), a
+/// smaller value is nearer to the event, otherwise a larger value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guide(pub &'static Measure);
 
 impl Guide {
-    /// Returns how near a value is to the event: a larger number is nearer.
+    /// Returns how near a value of the measure is to the event. The larger the result, the nearer.
     pub fn nearness(self, value: f64) -> f64 {
         if self.0.name.starts_with("min_") { -value } else { value }
     }

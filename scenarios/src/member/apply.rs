@@ -1,4 +1,4 @@
-//! Applies a member to a scenario: changes the text of the scenario's drivers.
+//! Applies a member of a driver ensemble to a scenario: changes the text of the scenario's drivers.
 
 use std::path::PathBuf;
 
@@ -30,12 +30,14 @@ pub enum Application {
     NoEffect,
 }
 
-/// Where the human driver of the ego stands, below `driver`.
+/// Path of the ego's human driver below `driver`.
 const HUMAN_OF_EGO: [&str; 2] = ["ego-stack", "human"];
 
-/// A place in the scenario that a member sets: the path of the key, and the index of the set.
+/// A value of the scenario that a member sets.
 struct Place {
+    /// The path of the value's key in the scenario.
     path: Vec<String>,
+    /// The index of the member's `[[set]]` with the new value.
     set: usize,
 }
 
@@ -43,9 +45,9 @@ impl Member {
     /// Applies the member to every human driver of `file` that is not prescribed, the ego's driver
     /// included, and checks the result.
     ///
-    /// A parameter that only the replaced values use keeps its name and gets the member's
-    /// distribution. The other parameters then keep their values in every sampling design. Any
-    /// other distribution becomes a new parameter.
+    /// If only replaced values use a parameter, the parameter keeps its name and gets the member's
+    /// distribution. All other parameters then keep their values in every sampling design. In any
+    /// other case a distribution becomes a new parameter.
     ///
     /// # Errors
     /// [`ApplyError`] if a value is not valid for a driver of the scenario.
@@ -78,32 +80,27 @@ impl Member {
     fn change_actor(&self, document: &mut DocumentMut, index: usize, places: &mut Vec<Place>) {
         let Some(actor) = actor_mut(document, index) else { return };
         let Some(mut driver) = actor.get_mut("driver").and_then(Item::as_table_like_mut) else { return };
-        let mut above = vec!["driver".to_owned()];
+        let mut parents = vec!["driver".to_owned()];
         if driver.contains_key(HUMAN_OF_EGO[0]) {
             for key in HUMAN_OF_EGO {
-                let Some(below) = driver.get_mut(key).and_then(Item::as_table_like_mut) else { return };
-                driver = below;
-                above.push(key.to_owned());
+                let Some(inner) = driver.get_mut(key).and_then(Item::as_table_like_mut) else { return };
+                driver = inner;
+                parents.push(key.to_owned());
             }
         }
         let Some(kind) = KINDS.into_iter().find(|kind| driver.contains_key(kind)) else { return };
         let (kind, model) = self.with_model(driver, kind);
         let Some(table) = driver.get_mut(&kind).and_then(Item::as_table_like_mut) else { return };
-        let sets: Vec<(usize, &Set)> =
-            self.sets.iter().enumerate().filter(|(_, set)| set.drivers.contains(&kind)).collect();
-        if sets.iter().any(|(_, set)| set.key.starts_with("lapse.")) {
-            // A lapse is given by one of two keys: the member's replaces the scenario's as a whole.
+        let sets = || self.sets.iter().enumerate().filter(|(_, set)| set.drivers.contains(&kind));
+        if sets().any(|(_, set)| set.key.starts_with("lapse.")) {
+            // One of two keys gives a lapse. The member's key replaces the scenario's whole table.
             table.remove("lapse");
         }
-        let with_path = |(set, text): (usize, &Set)| {
-            let below = path_in(&kind, &model, &text.key)?;
-            let path = above.iter().cloned().chain([kind.clone()]).chain(below).collect();
-            Some((path, set))
-        };
-        let paths: Vec<(Vec<String>, usize)> = sets.into_iter().filter_map(with_path).collect();
-        places.extend(paths.into_iter().map(|(path, set)| Place {
-            path: ["actor".to_owned(), index.to_string()].into_iter().chain(path).collect(),
-            set,
+        let parents: Vec<String> =
+            ["actor".to_owned(), index.to_string()].into_iter().chain(parents).chain([kind.clone()]).collect();
+        places.extend(sets().filter_map(|(set, Set { key, .. })| {
+            let keys = path_in(&kind, &model, key)?;
+            Some(Place { path: parents.iter().cloned().chain(keys).collect(), set })
         }));
     }
 
@@ -123,7 +120,7 @@ impl Member {
         let Some(old) = MODELS.into_iter().find(|model| holder.contains_key(model)) else {
             return (kind.to_owned(), String::new());
         };
-        let new = self.follow.as_ref().map_or(old, |(model, _)| model.as_str());
+        let new = self.follow.as_ref().map_or(old, |follow| follow.model.as_str());
         if new != old
             && let Some(table) = holder.remove(old)
         {
@@ -136,13 +133,14 @@ impl Member {
 
     /// Writes the values of the member into their places.
     fn set_values(&self, document: &mut DocumentMut, places: &[Place]) {
-        let olds: Vec<Option<String>> = places.iter().map(|place| parameter_at(document, &place.path)).collect();
-        for (place, old) in places.iter().zip(&olds) {
+        let old_parameters: Vec<Option<String>> =
+            places.iter().map(|place| parameter_at(document, &place.path)).collect();
+        for (place, old) in places.iter().zip(&old_parameters) {
             let set = &self.sets[place.set];
             let is_exclusive = |name: &str| {
                 let replaced = places
                     .iter()
-                    .zip(&olds)
+                    .zip(&old_parameters)
                     .filter(|(other, used)| other.set == place.set && used.as_deref() == Some(name));
                 uses(document.as_item(), name) == replaced.count()
             };
@@ -161,12 +159,12 @@ impl Member {
                 }
             }
         }
-        remove_unused(document, olds.into_iter().flatten());
+        remove_unused(document, old_parameters.into_iter().flatten());
     }
 }
 
-/// Returns the table of another model with the keys of `table` that it has: the keys of both
-/// models, and the two keys that mean the same.
+/// Returns the table of `model` with the values that `table` gives to another model: of the keys
+/// that both models have, and of the pairs of keys that mean the same.
 fn converted(table: &dyn TableLike, model: &str) -> InlineTable {
     let mut converted = InlineTable::new();
     for (key, item) in table.iter() {
@@ -182,15 +180,15 @@ fn converted(table: &dyn TableLike, model: &str) -> InlineTable {
             converted.insert(key, value);
         }
     }
-    // Headways that the scenario leaves out have the defaults of its own model.
+    // A headway that the scenario leaves out keeps the default of the scenario's model.
     let defaults = [
         ("idm", "standstill-gap-m", 1.5),
         ("idm", "time-gap-s", 0.9),
         ("wiedemann99", "cc0-m", 2.0),
         ("wiedemann99", "cc1-s", 1.5),
     ];
-    for (from_model, key, default) in defaults {
-        if from_model == model && !converted.contains_key(key) {
+    for (new_model, key, default) in defaults {
+        if new_model == model && !converted.contains_key(key) {
             converted.insert(key, Value::from(default));
         }
     }
@@ -212,7 +210,7 @@ fn parameter_at(document: &mut DocumentMut, path: &[String]) -> Option<String> {
     table.get(last)?.as_str()?.strip_prefix('$').map(str::to_owned)
 }
 
-/// Inserts `value` at `path`; tables on the way that do not exist are created.
+/// Inserts `value` at `path`, and creates the tables on the way that do not exist.
 fn insert(document: &mut DocumentMut, path: &[String], value: Value) {
     let [_, index, keys @ .., last] = path else { return };
     let Some(actor) = index.parse().ok().and_then(|index| actor_mut(document, index)) else { return };

@@ -54,7 +54,7 @@ pub enum MemberError {
         /// The name of both.
         name: String,
     },
-    /// No member, file or folder has that name, or the folder has no member.
+    /// No member, file or folder has this name, or the folder contains no member.
     #[error("{place}: expected a file or folder of members (*.toml), or one of {names}{suggestion}")]
     Unknown {
         /// The name or path.
@@ -73,24 +73,25 @@ struct MemberConfig {
     schema_version: u32,
     name: String,
     description: String,
-    follow: Option<FollowText>,
+    follow: Option<FollowConfig>,
     #[serde(default)]
-    set: Vec<SetText>,
+    set: Vec<SetConfig>,
     /// What a calibration writes beside the values: figures for the reader.
     #[serde(default)]
     calibration: Option<toml::Table>,
 }
 
-#[derive(Debug, Deserialize)]
+/// The car-following model that replaces the scenario's.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-struct FollowText {
-    model: String,
+pub(super) struct FollowConfig {
+    pub(super) model: String,
     source: String,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-struct SetText {
+struct SetConfig {
     key: String,
     value: toml::Value,
     drivers: Option<Vec<String>>,
@@ -122,8 +123,7 @@ pub struct Member {
     path: PathBuf,
     name: String,
     description: String,
-    /// The car-following model that replaces the scenario's, with its source.
-    pub(super) follow: Option<(String, String)>,
+    pub(super) follow: Option<FollowConfig>,
     pub(super) sets: Vec<Set>,
 }
 
@@ -156,27 +156,27 @@ impl Member {
             ));
         }
         drop(config.calibration);
-        let follow = match config.follow {
-            Some(follow) if !MODELS.contains(&follow.model.as_str()) => {
+        if let Some(follow) = &config.follow {
+            if !MODELS.contains(&follow.model.as_str()) {
                 return Err(wrong("follow.model", format!("`{}`: expected `wiedemann99` or `idm`", follow.model)));
             }
-            Some(follow) if follow.source.trim().is_empty() => {
+            if follow.source.trim().is_empty() {
                 return Err(wrong("follow.source", "the source is empty".to_owned()));
             }
-            follow => follow.map(|follow| (follow.model, follow.source)),
-        };
+        }
         let mut sets: Vec<Set> = Vec::with_capacity(config.set.len());
         for (index, set) in config.set.into_iter().enumerate() {
             let set = check_set(set).map_err(|(key, message)| wrong(&format!("set[{index}].{key}"), message))?;
-            if sets
-                .iter()
-                .any(|earlier| earlier.key == set.key && earlier.drivers.iter().any(|d| set.drivers.contains(d)))
-            {
+            let is_same = |earlier: &Set| {
+                earlier.key == set.key && earlier.drivers.iter().any(|driver| set.drivers.contains(driver))
+            };
+            if sets.iter().any(is_same) {
                 return Err(wrong(&format!("set[{index}].key"), format!("`{}` is set twice", set.key)));
             }
             sets.push(set);
         }
-        Ok(Self { path: path.to_owned(), name: config.name, description: config.description, follow, sets })
+        let MemberConfig { name, description, follow, .. } = config;
+        Ok(Self { path: path.to_owned(), name, description, follow, sets })
     }
 
     /// Returns the file.
@@ -196,7 +196,7 @@ impl Member {
 
     /// Returns the settings of the member, each as `key = value` with its source.
     pub fn values(&self) -> Vec<(String, String)> {
-        let follow = self.follow.iter().map(|(model, source)| (format!("follow = {model}"), source.clone()));
+        let follow = self.follow.iter().map(|follow| (format!("follow = {}", follow.model), follow.source.clone()));
         let sets = self.sets.iter().map(|set| (format!("{} = {}", set.key, set.value), set.source.clone()));
         follow.chain(sets).collect()
     }
@@ -204,9 +204,9 @@ impl Member {
 
 impl std::fmt::Display for SetValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self::Distribution(table) = self else {
-            let Self::Number(number) = self else { return Ok(()) };
-            return write!(f, "{number}");
+        let table = match self {
+            Self::Number(number) => return write!(f, "{number}"),
+            Self::Distribution(table) => table,
         };
         for (kind, value) in table {
             match value.as_table() {
@@ -221,8 +221,8 @@ impl std::fmt::Display for SetValue {
     }
 }
 
-/// Checks one `[[set]]`. The error is the key within it, and the reason.
-fn check_set(set: SetText) -> Result<Set, (String, String)> {
+/// Checks one `[[set]]`. The error holds the key in the table, and the reason.
+fn check_set(set: SetConfig) -> Result<Set, (String, String)> {
     let wrong = |key: &str, message: String| Err((key.to_owned(), message));
     if let Some(allowed) = unknown(&set.key) {
         return wrong("key", format!("`{}` is not a key of a human driver: {allowed}", set.key));

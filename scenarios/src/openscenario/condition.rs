@@ -1,60 +1,73 @@
-//! Triggers and conditions.
+//! Evaluates the triggers of a storyboard and their conditions.
+//!
+//! ```text
+//!  trigger   = group OR group OR …
+//!  group     = condition AND condition AND …
+//!  condition = value, then edge, then delay
+//! ```
 
 use super::dom::{ImportError, Node};
 use super::reader::is_true;
 use super::storyboard::{ElementState, Storyboard, StoryboardElement};
 use super::world::Vehicle;
 
+/// Difference of two values that are the same but for rounding: numerical.
+const SAME: f64 = 1e-9;
+
 /// What a condition remembers from step to step: its last value, and when it became true.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory {
-    was: Option<bool>,
+    last_value: Option<bool>,
     fired_s: Option<f64>,
 }
 
 impl Storyboard<'_> {
-    /// Returns whether a trigger is true. No trigger, or one without conditions, means at once.
+    /// Returns whether a trigger is true. An absent trigger, or one without conditions, is true at
+    /// once.
     pub(super) fn is_triggered(&mut self, trigger: Option<&Node>) -> Result<bool, ImportError> {
         let Some(trigger) = trigger.filter(|trigger| !trigger.children.is_empty()) else { return Ok(true) };
-        let mut is_any = false;
+        let mut any_group_holds = false;
         for group in trigger.all("ConditionGroup") {
-            let mut are_all = true;
+            let mut all_hold = true;
             if group.children.is_empty() {
                 return Err(self.reader.error(group, "it needs a `Condition`"));
             }
             for condition in group.all("Condition") {
-                // Each is evaluated in each step, for its edge.
-                are_all &= self.holds(condition)?;
+                // Every condition is evaluated in every step, because an edge depends on the value
+                // in the step before.
+                all_hold &= self.holds(condition)?;
             }
-            is_any |= are_all;
+            any_group_holds |= all_hold;
         }
-        Ok(is_any)
+        Ok(any_group_holds)
     }
 
+    /// Returns whether a condition is true, with its edge and its delay.
     fn holds(&mut self, node: &Node) -> Result<bool, ImportError> {
         let value = self.value(node)?;
         let edge = self.reader.text(node, "conditionEdge")?;
         let delay_s = self.reader.number_or(node, "delay", 0.0)?;
         let time_s = self.time_s;
         let memory = self.memories.entry(node.id).or_default();
-        let was = memory.was.replace(value);
+        let last_value = memory.last_value.replace(value);
         let is_now = match edge.as_str() {
             "none" => value,
-            "rising" => was == Some(false) && value,
-            "falling" => was == Some(true) && !value,
-            "risingOrFalling" => was.is_some_and(|was| was != value),
+            "rising" => last_value == Some(false) && value,
+            "falling" => last_value == Some(true) && !value,
+            "risingOrFalling" => last_value.is_some_and(|last_value| last_value != value),
             _ => return Err(self.reader.error(node, format!("`conditionEdge` is `{edge}`"))),
         };
         if is_now && memory.fired_s.is_none() {
             memory.fired_s = Some(time_s);
         }
-        // A condition with a delay stays true once it has been true: its value is a past value.
+        // A condition with a delay becomes true after the delay, and then stays true.
         Ok(match delay_s > 0.0 {
-            true => memory.fired_s.is_some_and(|fired_s| time_s >= fired_s + delay_s - 1e-9),
+            true => memory.fired_s.is_some_and(|fired_s| time_s >= fired_s + delay_s - SAME),
             false => is_now,
         })
     }
 
+    /// Returns the value of a condition, without its edge and its delay.
     fn value(&self, node: &Node) -> Result<bool, ImportError> {
         let inner = self.reader.only(node)?;
         let reader = &self.reader;
@@ -168,8 +181,8 @@ impl Storyboard<'_> {
             "greaterOrEqual" => left >= right,
             "lessThan" => left < right,
             "lessOrEqual" => left <= right,
-            "equalTo" => (left - right).abs() <= 1e-9,
-            "notEqualTo" => (left - right).abs() > 1e-9,
+            "equalTo" => (left - right).abs() <= SAME,
+            "notEqualTo" => (left - right).abs() > SAME,
             _ => return Err(self.reader.error(node, format!("`rule` is `{rule}`"))),
         })
     }

@@ -25,7 +25,7 @@ pub(super) struct Entities {
 /// Reads all entities.
 ///
 /// # Errors
-/// [`ImportError`] at an entity that is no vehicle, or that no catalogue has.
+/// [`ImportError`] at an entity that is not a vehicle, or that no catalogue contains.
 pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError> {
     let mut entities = Entities::default();
     let (mut catalogs, mut names) = (Catalogs::default(), BTreeMap::new());
@@ -41,8 +41,8 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError
         let mut vehicle = None;
         for child in &entity.children {
             match child.name.as_str() {
-                "Vehicle" => vehicle = Some(of_element(reader, child)?),
-                "CatalogReference" => vehicle = Some(of_catalog(reader, root, &mut catalogs, child)?),
+                "Vehicle" => vehicle = Some(read_vehicle(reader, child)?),
+                "CatalogReference" => vehicle = Some(vehicle_in_catalog(reader, root, &mut catalogs, child)?),
                 "ObjectController" => entities.controlled.push(name.clone()),
                 _ => {
                     return Err(reader.error(
@@ -70,6 +70,7 @@ struct Catalogs {
 }
 
 impl Catalogs {
+    /// Returns the files of a folder that may hold a catalogue.
     fn files(&mut self, folder: &Path) -> Vec<PathBuf> {
         let read = || {
             let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
@@ -82,20 +83,27 @@ impl Catalogs {
         self.folders.entry(folder.to_owned()).or_insert_with(read).clone()
     }
 
-    /// Returns the document of a file. `named` is the element that names its folder.
-    fn document(&mut self, path: &Path, (reader, named): (&Reader, &Node)) -> Result<&Node, ImportError> {
+    /// Returns the document of a file. An error points at `directory`, the element of the scenario
+    /// that names the folder of the file.
+    fn document(&mut self, path: &Path, reader: &Reader, directory: &Node) -> Result<&Node, ImportError> {
         match self.documents.entry(path.to_owned()) {
             Entry::Occupied(document) => Ok(document.into_mut()),
             Entry::Vacant(place) => {
                 let text = input::read_text(path)
-                    .map_err(|error| reader.error(named, format!("failed to read {}: {error}", path.display())))?;
+                    .map_err(|error| reader.error(directory, format!("failed to read {}: {error}", path.display())))?;
                 Ok(place.insert(parse(path, &text)?))
             }
         }
     }
 }
 
-fn of_catalog(reader: &Reader, root: &Node, catalogs: &mut Catalogs, reference: &Node) -> Result<Vehicle, ImportError> {
+/// Returns the vehicle that `reference` names in a catalogue.
+fn vehicle_in_catalog(
+    reader: &Reader,
+    root: &Node,
+    catalogs: &mut Catalogs,
+    reference: &Node,
+) -> Result<Vehicle, ImportError> {
     let [catalog, entry] = ["catalogName", "entryName"].map(|name| reader.text(reference, name));
     let (catalog, entry) = (catalog?, entry?);
     let Some(locations) = root.child("CatalogLocations") else {
@@ -106,24 +114,21 @@ fn of_catalog(reader: &Reader, root: &Node, catalogs: &mut Catalogs, reference: 
         let Some(directory) = location.child("Directory") else { continue };
         let folder = reader.path_in(directory, "path")?;
         for path in catalogs.files(&folder) {
-            let document = catalogs.document(&path, (reader, directory))?;
-            let Some(document_catalog) =
-                document.child("Catalog").filter(|document_catalog| document_catalog.raw("name") == Some(&catalog))
-            else {
-                continue;
-            };
+            let document = catalogs.document(&path, reader, directory)?;
+            let has_name = |node: &&Node| node.raw("name") == Some(&catalog);
+            let Some(entries) = document.child("Catalog").filter(has_name) else { continue };
             searched.push(path.display().to_string());
-            if let Some(node) = document_catalog.children.iter().find(|node| node.raw("name") == Some(&entry)) {
+            if let Some(node) = entries.children.iter().find(|node| node.raw("name") == Some(&entry)) {
                 if node.name != "Vehicle" {
                     let message =
                         format!("`{entry}` is a `{}`: a scenario has cars, trucks and motorcycles", node.name);
                     return Err(reader.error(reference, message));
                 }
                 let mut entry = node.clone();
-                let given = given(reader, reference, &entry)?;
-                let notes = structure::check(&path, &mut entry, &given)?;
+                let assigned = assigned_values(reader, reference, &entry)?;
+                let notes = structure::check(&path, &mut entry, &assigned)?;
                 catalogs.notes.extend(notes.iter().map(|note| format!("{}, {note}", path.display())));
-                return of_element(&Reader { path }, &entry);
+                return read_vehicle(&Reader { path }, &entry);
             }
         }
     }
@@ -132,11 +137,11 @@ fn of_catalog(reader: &Reader, root: &Node, catalogs: &mut Catalogs, reference: 
     Err(reader.error(reference, format!("no entry `{entry}` in the catalogue `{catalog}` ({places})")))
 }
 
-/// Returns the values that a reference gives to the parameters of an entry.
-fn given(reader: &Reader, reference: &Node, entry: &Node) -> Result<Given, ImportError> {
+/// Returns the values that a reference assigns to the parameters of a catalogue's entry.
+fn assigned_values(reader: &Reader, reference: &Node, entry: &Node) -> Result<Given, ImportError> {
     let lists = entry.all("ParameterDeclarations").flat_map(|list| list.all("ParameterDeclaration"));
     let names: BTreeSet<&str> = lists.filter_map(|declaration| declaration.raw("name")).collect();
-    let mut given = Given::new();
+    let mut assigned = Given::new();
     for assignment in
         reference.child("ParameterAssignments").into_iter().flat_map(|list| list.all("ParameterAssignment"))
     {
@@ -144,12 +149,13 @@ fn given(reader: &Reader, reference: &Node, entry: &Node) -> Result<Given, Impor
         if !names.contains(name.as_str()) {
             return Err(reader.error(assignment, no_parameter(&name, &names)));
         }
-        given.insert(name, reader.text(assignment, "value")?);
+        assigned.insert(name, reader.text(assignment, "value")?);
     }
-    Ok(given)
+    Ok(assigned)
 }
 
-fn of_element(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
+/// Reads an element `Vehicle`.
+fn read_vehicle(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
     let category = reader.text(node, "vehicleCategory")?;
     let class = match category.as_str() {
         "car" | "van" => "car",

@@ -1,35 +1,38 @@
 //! A vehicle that keeps a gap to another: `LongitudinalDistanceAction` during a run.
 //!
-//! `tool export` writes this action for a human driver who follows. The import makes such a driver
-//! of it: Wiedemann 99, whose gap of equilibrium cc0 + cc1·v + cc2/2 is the gap of the action at
-//! the speed v of the vehicle ahead. While the storyboard is played, the follower comes to its gap
-//! within the limits of the action. That motion decides only when triggers fire that look at the
-//! follower.
+//! `tool export` writes this action for a human driver who follows. The import turns the action
+//! into such a driver: Wiedemann 99, whose equilibrium gap cc0 + cc1·v + cc2/2 equals the gap of
+//! the action at the speed v of the vehicle ahead. While the import plays the storyboard, the
+//! follower approaches its gap within the limits of the action. Only triggers that look at the
+//! follower depend on this motion.
 
 use super::dom::{ImportError, Node};
 use super::reader::is_true;
 use super::storyboard::{STEP_S, Storyboard};
 use super::world::Vehicle;
 
-/// Gap at standstill, cc0 (m): the default of a scenario file.
+/// Gap at standstill, cc0 (m), as in a scenario file by default.
 const CC0_M: f64 = 1.5;
-/// Distance by which the gap may exceed the safe gap, cc2 (m): the default of a scenario file.
+/// Distance by which the gap may exceed the safe gap, cc2 (m), as in a scenario file by default.
 const CC2_M: f64 = 4.0;
-/// Largest time headway kept in addition to cc0, cc1 (s), as in a scenario file.
+/// Largest cc1, the time headway in addition to cc0 (s), that a scenario file allows.
 const MOST_CC1_S: f64 = 10.0;
 /// Time in which a follower closes the difference between its gap and the gap of the action (s): an
 /// assumption; 1 to 5 are plausible.
 const CLOSING_S: f64 = 2.0;
 
-/// A vehicle that follows.
+/// A vehicle that follows another by an action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Following {
+    /// Index of the follower.
     pub(super) vehicle: usize,
+    /// Index of the vehicle ahead.
     lead: usize,
+    /// Line of the action, counted from 1.
     pub(super) line: usize,
-    /// The gap between the bumpers is this distance (m) and this time (s) at the speed of the
-    /// follower.
+    /// Constant part of the gap between the bumpers (m).
     gap_m: f64,
+    /// Part of the gap that grows with the speed of the follower (s).
     gap_s: f64,
     max_acceleration_mps2: f64,
     max_deceleration_mps2: f64,
@@ -76,7 +79,7 @@ impl Storyboard<'_> {
             let names = format!("`{}` is not behind `{}`", follower.name, ahead.name);
             return refuse(format!("{names}: a driver follows a vehicle ahead"));
         }
-        // Between the reference points, the distance contains parts of both vehicles.
+        // A distance between the reference points contains parts of both vehicles.
         let inside_m = match is_true(node, "freespace") {
             true => 0.0,
             false => (follower.front_m() - follower.s_m) + (ahead.s_m - ahead.back_m()),
@@ -114,7 +117,8 @@ impl Storyboard<'_> {
         })
     }
 
-    /// Makes a vehicle follow another, and notes what becomes of it.
+    /// Makes a vehicle follow another, and adds a note about the driver that the import makes of
+    /// it.
     pub(super) fn follow(&mut self, node: &Node, vehicle: usize) -> Result<Following, ImportError> {
         let following = self.following(node, vehicle)?;
         if vehicle != self.ego {
