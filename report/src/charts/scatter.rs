@@ -1,4 +1,5 @@
-//! Points with intervals in both directions. Some are marked.
+//! Scatter plots: points with a 95 % interval along each axis. Marked points stand out, and have
+//! labels that cover neither a point nor another label.
 
 use std::io;
 use std::ops::Range;
@@ -14,9 +15,9 @@ pub(crate) struct ScatterPoint {
     pub(crate) at: [f64; 2],
     /// The 95 % interval along each axis.
     pub(crate) intervals_95: [[f64; 2]; 2],
-    /// The text beside a marked point.
+    /// The text beside the point, if the point is marked.
     pub(crate) label: String,
-    /// True for a marked point.
+    /// True if the point stands out.
     pub(crate) is_marked: bool,
 }
 
@@ -53,7 +54,7 @@ pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) ->
         // Marked points are drawn last, over the others.
         let (marked, others): (Vec<&ScatterPoint>, Vec<&ScatterPoint>) =
             points.iter().partition(|point| point.is_marked);
-        for point in others.into_iter().chain(marked) {
+        for point in others.into_iter().chain(marked.iter().copied()) {
             let [x, y] = point.at;
             let [[left, right], [low, high]] = point.intervals_95;
             let line = if point.is_marked { MARKED.to_rgba() } else { OTHER.mix(FAINT) };
@@ -64,14 +65,13 @@ pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) ->
             let colour = if point.is_marked { MARKED } else { OTHER };
             plot.draw_series([Circle::new((x, y), POINT_PX, colour.filled())])?;
         }
-        let marked: Vec<&ScatterPoint> = points.iter().filter(|point| point.is_marked).collect();
-        let at = |point: &&ScatterPoint| plot.backend_coord(&(point.at[0], point.at[1]));
-        let centres: Vec<(i32, i32)> = marked.iter().map(at).collect();
+        let pixel = |point: &&ScatterPoint| plot.backend_coord(&(point.at[0], point.at[1]));
+        let centres: Vec<(i32, i32)> = marked.iter().map(pixel).collect();
         let lengths: Vec<usize> = marked.iter().map(|point| point.label.chars().count()).collect();
-        for (point, place) in marked.iter().zip(places(&centres, &lengths)) {
-            // The table beside the chart also has a point whose label has no room.
-            if let Some(place) = place {
-                let text = Text::new(point.label.clone(), place, label_text(false));
+        for (point, offset) in marked.iter().zip(label_offsets(&centres, &lengths)) {
+            // A label without room is left out. The table beside the chart lists every point.
+            if let Some(offset) = offset {
+                let text = Text::new(point.label.clone(), offset, label_text(false));
                 plot.draw_series([EmptyElement::at((point.at[0], point.at[1])) + text])?;
             }
         }
@@ -80,10 +80,10 @@ pub(crate) fn scatter(points: &[ScatterPoint], title: &str, names: [&str; 2]) ->
     drawn.map_err(|error| io::Error::other(error.to_string()))
 }
 
-/// Returns the offset of the label of each point from its centre (px), by the centres (px) and the
-/// numbers of letters. No label covers another label, a point, or the edge of the chart. A label
-/// without room has none.
-fn places(centres: &[(i32, i32)], lengths: &[usize]) -> Vec<Option<(i32, i32)>> {
+/// Returns the offset of each point's label from the centre of the point (px). `lengths` are the
+/// numbers of letters of the labels. No label covers another label, a point, or the edge of the
+/// chart; `None` if a label has no room.
+fn label_offsets(centres: &[(i32, i32)], lengths: &[usize]) -> Vec<Option<(i32, i32)>> {
     let overlap = |[left, top, right, bottom]: [i32; 4], other: [i32; 4]| {
         left < other[2] && other[0] < right && top < other[3] && other[1] < bottom
     };
@@ -133,7 +133,7 @@ mod tests {
         // Four combinations of a frontier, two of them almost at one place, and one at the right
         // edge.
         let centres = [(400, 200), (403, 204), (420, 210), (840, 300)];
-        let offsets = places(&centres, &[23; 4]);
+        let offsets = label_offsets(&centres, &[23; 4]);
         let areas: Vec<[i32; 4]> =
             centres.iter().zip(&offsets).map(|(centre, offset)| area(*centre, offset.unwrap(), 23)).collect();
         for (index, one) in areas.iter().enumerate() {
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn labels_without_room_are_left_out() {
-        let offsets = places(&[(400, 200); 40], &[23; 40]);
+        let offsets = label_offsets(&[(400, 200); 40], &[23; 40]);
         let shown = offsets.iter().flatten().count();
         assert!((2..40).contains(&shown), "{shown}");
         assert_eq!(offsets[0], Some((ASIDE_PX, -ABOVE_PX)));

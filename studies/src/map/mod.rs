@@ -17,7 +17,7 @@ mod run;
 mod svg;
 mod table;
 
-pub use point::{MapPoint, PAPER_IN_TIME};
+pub use point::MapPoint;
 pub use run::{Map, MapError, MapGrid, map};
 pub use svg::panel;
 pub use table::{MapText, csv};

@@ -2,11 +2,6 @@
 
 use serde::Serialize;
 
-/// The region in which the paper's system is in time: upper end of each band of the speed
-/// difference (km/h), and the share of the cases in it. Above the last band the share is 0; between
-/// 25 and 30 km/h the paper states none.
-pub const PAPER_IN_TIME: [(f64, &str); 3] = [(20.0, "always"), (25.0, "59 %"), (30.0, "not stated")];
-
 /// Largest difference of margin between theory and loop that needs no reason (s).
 const AGREES_WITHIN_S: f64 = 0.2;
 
