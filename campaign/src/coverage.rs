@@ -1,9 +1,10 @@
-//! What the samples of a scenario cover.
+//! Counts which bins of a scenario's coverage plan the samples hit, and in which bins the ego
+//! collides.
 
 use std::sync::Arc;
 
 use closecall_scenarios::Scenario;
-use closecall_scenarios::coverage::{CoverageName, Surroundings};
+use closecall_scenarios::coverage::{CoverageName, Surroundings, Target};
 use closecall_scenarios::sampling::Design;
 use serde::Serialize;
 
@@ -14,12 +15,19 @@ use crate::runner::Work;
 #[derive(Clone, Debug)]
 pub struct CoverageCounter {
     work: Arc<Work>,
-    /// For each target the hits of each bin.
-    hits: Vec<Vec<u64>>,
-    /// For each target and bin the samples of each arm in which the ego collides.
-    collided: Vec<Vec<Vec<u64>>>,
-    /// For each target the samples that are in no bin.
-    outside: Vec<u64>,
+    /// The counts of each target of the plan.
+    counts: Vec<TargetCounts>,
+}
+
+/// The counts of one item or cross.
+#[derive(Clone, Debug)]
+struct TargetCounts {
+    /// Number of samples in each bin.
+    hits: Vec<u64>,
+    /// For each bin the number of samples of each arm in which the ego collides.
+    collided: Vec<Vec<u64>>,
+    /// Number of samples in no bin.
+    outside: u64,
 }
 
 /// A bin of an item or a cross.
@@ -43,16 +51,16 @@ pub struct CoverageResult {
     pub name: CoverageName,
     /// The parameters, measures and attributes that the items divide into bins.
     pub subjects: Vec<String>,
-    /// Samples by which a bin is covered.
+    /// Number of samples that cover a bin.
     pub at_least: u64,
     /// Number of covered bins.
     pub covered: u64,
-    /// The bins that count, in the order of their items.
+    /// The bins that are to be covered, in the order of their items.
     pub bins: Vec<BinHits>,
     /// Number of samples that are in no bin.
     pub outside: u64,
-    /// Probability that the ego collides in each arm, given one of the bins that were hit. Only the
-    /// bins that the sampling design `coverage` visits in turn have it.
+    /// Probability that the ego collides in each arm, given that the sample is in one of the hit
+    /// bins. Only the target whose bins the sampling design `coverage` visits in turn has it.
     pub weighted_collision_rates: Option<Vec<f64>>,
 }
 
@@ -71,11 +79,13 @@ impl CoverageResult {
 impl CoverageCounter {
     /// Returns a counter without samples.
     pub fn new(work: &Arc<Work>) -> Self {
-        let targets = &work.file.coverage().targets;
-        let hits = targets.iter().map(|target| vec![0; target.counts.len()]).collect();
-        let of_arms = vec![0; work.arms.len()];
-        let collided = targets.iter().map(|target| vec![of_arms.clone(); target.counts.len()]).collect();
-        Self { work: Arc::clone(work), hits, collided, outside: vec![0; targets.len()] }
+        let zero = |bins: usize| TargetCounts {
+            hits: vec![0; bins],
+            collided: vec![vec![0; work.arms.len()]; bins],
+            outside: 0,
+        };
+        let counts = work.file.coverage().targets.iter().map(|target| zero(target.counts.len())).collect();
+        Self { work: Arc::clone(work), counts }
     }
 
     /// Adds one sample: the run of the arm under test. A sample that ended in an error covers
@@ -86,15 +96,15 @@ impl CoverageCounter {
         let Some(outcome) = outcome.filter(|_| !plan.items.is_empty()) else { return };
         let concrete = || self.work.file.concrete(&outcome.parameters).ok();
         let surroundings = || concrete().map(|Scenario { environment, road, .. }| Surroundings { environment, road });
-        let of_items: Vec<Option<usize>> = plan.items.iter().map(|item| item.bin(outcome, &surroundings)).collect();
+        let item_bins: Vec<Option<usize>> = plan.items.iter().map(|item| item.bin(outcome, &surroundings)).collect();
         let tallies = record.tallies();
-        for (place, target) in plan.targets.iter().enumerate() {
-            let Some(index) = target.index(&of_items, &plan.items).filter(|&index| target.counts[index]) else {
-                self.outside[place] += 1;
+        for (target, counts) in plan.targets.iter().zip(&mut self.counts) {
+            let Some(bin) = target.index(&item_bins, &plan.items).filter(|&bin| target.counts[bin]) else {
+                counts.outside += 1;
                 continue;
             };
-            self.hits[place][index] += 1;
-            for (collided, tally) in self.collided[place][index].iter_mut().zip(&tallies) {
+            counts.hits[bin] += 1;
+            for (collided, tally) in counts.collided[bin].iter_mut().zip(&tallies) {
                 *collided += u64::from(tally.collided == Some(true));
             }
         }
@@ -102,24 +112,24 @@ impl CoverageCounter {
 
     /// Returns how each item and cross is covered.
     pub fn results(&self) -> Vec<CoverageResult> {
-        (0..self.hits.len()).map(|place| self.result(place)).collect()
+        let targets = &self.work.file.coverage().targets;
+        targets.iter().zip(&self.counts).map(|(target, counts)| self.result(target, counts)).collect()
     }
 
     /// Returns the share of an item or cross that is covered, and the number of samples in its
     /// bins; `None` if the scenario has no item or cross of this name.
     pub fn share(&self, name: &str) -> Option<(f64, u64)> {
-        let plan = self.work.file.coverage();
-        let place = plan.targets.iter().position(|target| target.name.as_str() == name)?;
-        Some((self.result(place).share(), self.hits[place].iter().sum()))
+        let targets = &self.work.file.coverage().targets;
+        let (target, counts) = targets.iter().zip(&self.counts).find(|(target, _)| target.name.as_str() == name)?;
+        Some((self.result(target, counts).share(), counts.hits.iter().sum()))
     }
 
-    fn result(&self, place: usize) -> CoverageResult {
+    fn result(&self, target: &Target, counts: &TargetCounts) -> CoverageResult {
         let plan = self.work.file.coverage();
-        let target = &plan.targets[place];
         let bin = |index: usize| BinHits {
             bins: target.bins(index, &plan.items).iter().map(ToString::to_string).collect(),
-            hits: self.hits[place][index],
-            collided: self.collided[place][index].clone(),
+            hits: counts.hits[index],
+            collided: counts.collided[index].clone(),
             weight: target.weights.as_ref().map(|weights| weights[index]),
         };
         let bins: Vec<BinHits> = (0..target.counts.len()).filter(|&index| target.counts[index]).map(bin).collect();
@@ -129,20 +139,21 @@ impl CoverageCounter {
             subjects: target.items.iter().map(|&item| plan.items[item].subject.clone()).collect(),
             at_least: target.at_least,
             covered: bins.iter().filter(|bin| bin.hits >= target.at_least).count() as u64,
-            outside: self.outside[place],
-            weighted_collision_rates: is_visited.then(|| weighted(&bins, self.work.arms.len())).flatten(),
+            outside: counts.outside,
+            weighted_collision_rates: is_visited.then(|| weighted_rates(&bins, self.work.arms.len())).flatten(),
             bins,
         }
     }
 }
 
-/// Returns the weighted mean of the rate in each bin that was hit, for each arm.
-fn weighted(bins: &[BinHits], arms: usize) -> Option<Vec<f64>> {
-    let hit = || bins.iter().filter(|bin| bin.hits > 0);
-    let all: f64 = hit().map(|bin| bin.weight).sum::<Option<f64>>()?;
-    let of_arm = |arm: usize| {
-        let rates = hit().map(|bin| Some(bin.weight? * bin.collided[arm] as f64 / bin.hits as f64));
-        Some(rates.sum::<Option<f64>>()? / all)
+/// Returns for each arm the mean of the collision rates in the hit bins, weighted by the
+/// probability of the bins. Returns `None` if a probability is unknown, or if no bin was hit.
+fn weighted_rates(bins: &[BinHits], arms: usize) -> Option<Vec<f64>> {
+    let hit_bins = || bins.iter().filter(|bin| bin.hits > 0);
+    let probability: f64 = hit_bins().map(|bin| bin.weight).sum::<Option<f64>>()?;
+    let arm_rate = |arm: usize| {
+        let rates = hit_bins().map(|bin| Some(bin.weight? * bin.collided[arm] as f64 / bin.hits as f64));
+        Some(rates.sum::<Option<f64>>()? / probability)
     };
-    if all > 0.0 { (0..arms).map(of_arm).collect() } else { None }
+    if probability > 0.0 { (0..arms).map(arm_rate).collect() } else { None }
 }

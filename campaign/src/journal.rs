@@ -83,6 +83,7 @@ impl Journal {
     }
 }
 
+/// Returns the line of a record: its checksum, and the record as JSON.
 pub(crate) fn line<T: serde::Serialize>(record: &T) -> io::Result<Vec<u8>> {
     let mut line = vec![b'0'; CHECKSUM_DIGITS];
     line.push(b' ');
@@ -148,9 +149,9 @@ impl Iterator for Entries {
         self.buffer.clear();
         match read_line(&mut self.reader, &mut self.buffer) {
             Ok(0) => None,
-            Ok(read) => {
+            Ok(length) => {
                 self.line += 1;
-                self.end += read;
+                self.end += length;
                 Some(match parse(&self.buffer) {
                     Ok(record) => Ok(Entry::Record { record: Box::new(record), end: self.end }),
                     Err(reason) => self.torn(reason),
@@ -173,14 +174,15 @@ impl Entries {
     }
 }
 
-/// Returns the lines of a journal that are copies of others, counted from 1. Of a line that is
-/// there more than once, the copy in the order of the plan stays. `order` returns the place of a
-/// record in the plan, `None` for a record of another campaign.
+/// Returns the numbers of the lines to remove, counted from 1, so that each line is in the journal
+/// once. Of equal lines, the first one that precedes the line behind it in the order of the plan
+/// stays. `order` returns the place of a record in the plan, or `None` for a record of another
+/// campaign.
 ///
 /// # Errors
 /// The error of the operating system if the file cannot be read.
 pub(crate) fn copies<K: Ord + Copy>(path: &Path, order: impl Fn(&Record) -> Option<K>) -> io::Result<HashSet<usize>> {
-    let open = || Ok::<_, io::Error>(BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?));
+    let open = || -> io::Result<_> { Ok(BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?)) };
     let (mut counts, mut line) = (HashMap::<[u8; CHECKSUM_DIGITS], u32>::new(), Vec::new());
     let mut reader = open()?;
     while read_line(&mut reader, &mut line)? > 0 {
@@ -192,7 +194,6 @@ pub(crate) fn copies<K: Ord + Copy>(path: &Path, order: impl Fn(&Record) -> Opti
     if counts.values().all(|count| *count == 1) {
         return Ok(copies);
     }
-    // The number, the checksum and the place of each intact line.
     let (mut lines, mut reader) = (Vec::new(), open()?);
     for number in 1.. {
         if read_line(&mut reader, &mut line)? == 0 {
@@ -201,33 +202,45 @@ pub(crate) fn copies<K: Ord + Copy>(path: &Path, order: impl Fn(&Record) -> Opti
         if let (Some(sum), Ok(record)) = (line.first_chunk::<CHECKSUM_DIGITS>().copied(), parse::<Record>(&line))
             && let Some(place) = order(&record)
         {
-            lines.push((number, sum, place));
+            lines.push(IntactLine { number, sum, place });
         }
     }
-    let groups: Vec<_> = lines.chunk_by(|one, next| one.1 == next.1).collect();
+    // Equal lines directly behind each other form a group, of which at most one line stays.
+    let groups: Vec<_> = lines.chunk_by(|line, next| line.sum == next.sum).collect();
     let mut kept = HashSet::new();
     for (index, group) in groups.iter().enumerate() {
-        let (_, sum, place) = group[0];
+        let IntactLine { sum, place, .. } = group[0];
         let is_single = counts.get(&sum) == Some(&1);
-        let is_in_order = groups.get(index + 1).is_none_or(|next| next[0].2 > place);
+        let is_in_order = groups.get(index + 1).is_none_or(|next| next[0].place > place);
         let stays = is_single || (is_in_order && kept.insert(sum));
-        copies.extend(group.iter().skip(usize::from(stays)).map(|(number, ..)| *number));
+        copies.extend(group.iter().skip(usize::from(stays)).map(|line| line.number));
     }
     Ok(copies)
 }
 
-/// Reads a line. Of a line that is too long, as a damaged disk leaves it, no more than
-/// [`MOST_LINE_BYTES`] are kept, without its end. Returns its length (bytes), 0 at the end of the
-/// file.
-pub(crate) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<u64> {
-    line.clear();
-    let mut read = reader.by_ref().take(MOST_LINE_BYTES).read_until(b'\n', line)? as u64;
-    if read == MOST_LINE_BYTES && line.last() != Some(&b'\n') {
-        read += reader.skip_until(b'\n')? as u64;
-    }
-    Ok(read)
+/// A line of a journal that holds a record.
+#[derive(Clone, Copy)]
+struct IntactLine<K> {
+    /// The number of the line, counted from 1.
+    number: usize,
+    /// The checksum.
+    sum: [u8; CHECKSUM_DIGITS],
+    /// The place of the record in the plan.
+    place: K,
 }
 
+/// Reads a line, and returns its length (bytes): 0 at the end of the file. A damaged disk may leave
+/// a line that is too long. Only its first [`MOST_LINE_BYTES`] are kept.
+pub(crate) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<u64> {
+    line.clear();
+    let mut length = reader.by_ref().take(MOST_LINE_BYTES).read_until(b'\n', line)? as u64;
+    if length == MOST_LINE_BYTES && line.last() != Some(&b'\n') {
+        length += reader.skip_until(b'\n')? as u64;
+    }
+    Ok(length)
+}
+
+/// Returns the record of a line, or what is wrong with the line.
 pub(crate) fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
     let Some(line) = line.strip_suffix(b"\n") else { return Err("the line is incomplete".to_owned()) };
     let (Some(sum), Some(b' '), Some(record)) =

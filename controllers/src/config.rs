@@ -1,4 +1,5 @@
-//! The `driver` table of an actor.
+//! The `driver` table of an actor: who drives the vehicle. [`DriverConfig`] is the text, and
+//! [`CheckedDriver`] the checked driver, which builds a driver for each run.
 
 use closecall_traffic::{Check, ConfigError, Parameters};
 use schemars::JsonSchema;
@@ -6,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::driver::{
     Driver, Follow, Idm, IdmConfig, MergingDriver, Overtaker, OvertakerConfig, Prescribed, PrescribedConfig, Reaction,
-    ReactionChange, Wiedemann99Config, Wiedemann99Driver,
+    ReactionChange, Wiedemann99, Wiedemann99Config, Wiedemann99Driver,
 };
 use crate::ego::{EgoSettings, EgoStackConfig};
 
@@ -37,8 +38,8 @@ pub enum CheckedDriver {
 }
 
 impl CheckedDriver {
-    /// Returns the same driver in the mirrored world, in which left and right are exchanged. Most
-    /// drivers depend only on the overtaking side, which they read from the road.
+    /// Returns the same driver for the mirrored world, in which left and right are exchanged. Only
+    /// a prescribed driver changes: the others read the overtaking side from the road.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         match self {
@@ -54,7 +55,7 @@ pub enum HumanDriver {
     /// A list of times and speeds.
     Prescribed(Prescribed),
     /// A driver that follows by Wiedemann 99.
-    Wiedemann99(crate::driver::Wiedemann99),
+    Wiedemann99(Wiedemann99),
     /// A driver that follows by the Intelligent Driver Model.
     Idm(Idm),
     /// A driver that approaches fast and overtakes.
@@ -107,8 +108,8 @@ impl HumanDriver {
         }
     }
 
-    /// Returns whether the driver can leave an acceleration lane: it follows, and stays in its lane
-    /// otherwise.
+    /// Returns whether the driver can start on an acceleration lane and merge: only drivers that
+    /// follow and otherwise stay in their lane can.
     pub fn can_merge(&self) -> bool {
         match self {
             Self::Wiedemann99(_) | Self::Idm(_) => true,
@@ -116,9 +117,9 @@ impl HumanDriver {
         }
     }
 
-    /// Builds a new driver for one run that starts on an acceleration lane, as
-    /// [`build`](Self::build) does. The driver leaves the lane before its end, if it
-    /// [can](Self::can_merge).
+    /// Builds a new driver for one run that starts on an acceleration lane. A driver that [can
+    /// merge](Self::can_merge) leaves the lane before its end; [`build`](Self::build) builds any
+    /// other driver.
     pub fn build_merging(&self) -> Box<dyn Driver> {
         let reaction_s = self.reaction_s().unwrap_or(0.0);
         match self {

@@ -1,4 +1,5 @@
-//! The result of a frontier.
+//! The result of a frontier: what each combination of settings prevents, induces and costs, and
+//! which combinations are Pareto-optimal.
 
 use closecall_traffic::statistics::interval::{COVERAGE, clopper_pearson};
 use closecall_traffic::statistics::sensitivity::jackknife::{Estimate, student};
@@ -43,7 +44,7 @@ pub struct Point {
     pub collisions_without: u64,
     /// Collisions of the ego in the arm under test.
     pub collisions: u64,
-    /// Pairs of both arms.
+    /// Counts of the pairs: prevented, induced, both, neither.
     pub pairs: Pairs,
     /// Prevented collisions as a share of the baseline's collisions; `None` if the baseline has
     /// none.
@@ -53,21 +54,22 @@ pub struct Point {
     /// Mean over the samples of the largest speed deficit to the lead vehicle, less the deficit in
     /// the baseline (m/s); `None` for fewer than two samples.
     pub speed_lost_mps: Option<Estimate>,
-    /// True if the combination is Pareto-optimal: no other combination is better in one of
-    /// prevented, induced and speed lost, and at least as good in the other two. The speed lost
-    /// counts in steps of 0.01 m/s, as it is reported.
+    /// True if the combination is Pareto-optimal: no other combination is better in one of the
+    /// three figures (prevented, induced, speed lost) and at least as good in the other two. The
+    /// speed lost is rounded to 0.01 m/s, as in the reports.
     pub is_optimal: bool,
 }
 
 impl Point {
     pub(super) fn new(values: Vec<String>, baseline: &[Tally], tested: &[Tally]) -> Self {
-        let (mut pairs, mut lost_mps, mut without, mut with) = (Pairs::default(), Vec::new(), 0, 0);
+        let (mut pairs, mut lost_mps) = (Pairs::default(), Vec::new());
+        let (mut collisions_without, mut collisions) = (0, 0);
         for (baseline, tested) in baseline.iter().zip(tested) {
             let (Some(collides_without), Some(collides_with)) = (baseline.collided, tested.collided) else { continue };
             pairs.push(baseline, tested);
             lost_mps.push(tested.speed_deficit_mps - baseline.speed_deficit_mps);
-            without += u64::from(collides_without);
-            with += u64::from(collides_with);
+            collisions_without += u64::from(collides_without);
+            collisions += u64::from(collides_with);
         }
         let samples = lost_mps.len() as u64;
         let share = |hits: u64, trials: u64| {
@@ -77,9 +79,9 @@ impl Point {
         Self {
             values,
             samples,
-            collisions_without: without,
-            collisions: with,
-            prevented: share(pairs.prevented, without),
+            collisions_without,
+            collisions,
+            prevented: share(pairs.prevented, collisions_without),
             induced: share(pairs.induced, samples),
             speed_lost_mps: student(&lost_mps),
             pairs,
@@ -87,18 +89,17 @@ impl Point {
         }
     }
 
-    /// Returns the three costs of a point: remaining collisions, induced collisions, and speed
-    /// lost in whole steps.
+    /// Returns the three costs of a point, each better if it is smaller: minus the prevented share,
+    /// the induced share, and the speed lost in whole steps. Returns `None` if one is unknown.
     fn costs(&self) -> Option<[f64; 3]> {
         let value = |estimate: Option<Estimate>| Some(estimate?.value);
         let lost_steps = (value(self.speed_lost_mps)? / SPEED_LOST_STEP_MPS).round();
         Some([-value(self.prevented)?, value(self.induced)?, lost_steps])
     }
 
-    /// Returns the number of samples that are induced or collide in both arms, although only
-    /// vehicles other than the ego collide in the arm under test. They are no collisions of the
-    /// ego.
-    pub fn of_others(&self) -> u64 {
+    /// Returns the number of induced or both-arms pairs in which only vehicles other than the ego
+    /// collide in the arm under test. [`collisions`](Self::collisions) leaves them out.
+    pub fn collisions_of_others_only(&self) -> u64 {
         self.pairs.induced_of_others + self.pairs.both_of_others
     }
 }
@@ -119,7 +120,7 @@ impl Frontier {
     }
 }
 
-/// Marks the points that no other point dominates.
+/// Marks the points that no other point dominates. A point with an unknown cost is not marked.
 fn mark_optimal(points: &mut [Point]) {
     let costs: Vec<Option<[f64; 3]>> = points.iter().map(Point::costs).collect();
     let dominates = |one: &[f64; 3], other: &[f64; 3]| {
@@ -186,6 +187,6 @@ mod tests {
         tested[0].others_collided = true;
         let point = Point::new(Vec::new(), &baseline, &tested);
         assert_eq!((point.collisions_without, point.collisions, point.pairs.prevented), (1, 0, 0));
-        assert_eq!(point.of_others(), 1);
+        assert_eq!(point.collisions_of_others_only(), 1);
     }
 }

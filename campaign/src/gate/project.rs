@@ -1,8 +1,9 @@
 //! The project file, `closecall.toml`: gates for every campaign that is run in a folder or below
 //! it.
 //!
-//! The files of all folders above count. A nearer file may demand more than one above it. If it
-//! demands less, it weakens that file as a gate of the command line does.
+//! The files of all folders above count. A nearer file may demand more than a file above it. If a
+//! nearer file demands less, the verdict names the weakened gate, as for a gate of the command
+//! line.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -23,7 +24,7 @@ pub struct ProjectError {
     pub path: PathBuf,
     /// What is wrong, with the line.
     pub message: String,
-    /// Whether the system cannot read the file.
+    /// Whether the operating system failed to read the file.
     pub is_io: bool,
 }
 
@@ -50,19 +51,13 @@ impl ProjectFile {
     pub fn find(folder: &Path) -> Result<Vec<Self>, ProjectError> {
         let mut files = Vec::new();
         for path in folder.ancestors().map(|folder| folder.join(PROJECT_FILE)) {
-            // A file that cannot be read may hold gates: they must not be left out. A link that
-            // leads nowhere is one, for example into a submodule that is not checked out.
-            match path.symlink_metadata() {
+            // A file that exists but cannot be read may hold gates, so it is an error and not left
+            // out. The metadata of the link itself also find a broken link, for example into a
+            // submodule that is not checked out.
+            match path.symlink_metadata().map_err(|error| (error.kind(), error)) {
                 Ok(_) => files.push(Self::read(&path)?),
-                Err(error)
-                    if !matches!(
-                        error.kind(),
-                        ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::PermissionDenied
-                    ) =>
-                {
-                    return Err(ProjectError { path, message: error.to_string(), is_io: true });
-                }
-                _ => (),
+                Err((ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::PermissionDenied, _)) => {}
+                Err((_, error)) => return Err(ProjectError { path, message: error.to_string(), is_io: true }),
             }
         }
         Ok(files)

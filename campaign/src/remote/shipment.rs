@@ -1,5 +1,6 @@
-//! What a machine needs to run blocks of a campaign: the manifest, which holds the scenarios with
-//! their recorded traffic, and the files that the commands of controllers name.
+//! The data that is sent to a remote machine before it runs blocks of a campaign: the manifest,
+//! which holds the scenarios with their recorded traffic, and the files that controllers and
+//! perception programs name.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -11,16 +12,18 @@ use super::error::RemoteError;
 use crate::fingerprint::{named_files, program_files};
 use crate::manifest::Manifest;
 
-/// The data that a machine needs to run blocks of a campaign.
+/// The data that a remote machine needs to run blocks of a campaign.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shipment {
-    /// The version of the program that has started the campaign.
+    /// The version of the program that started the campaign.
     pub version: String,
     /// The manifest (JSON).
     pub manifest: String,
-    /// The controllers of the program that has Closecall as a library. The engine ships them.
+    /// The names of the controllers of a user's own program that calls Closecall as a library. The
+    /// engine that distributes the work must bring their code to the machine.
     pub controllers: Vec<String>,
-    /// The files that controllers name by a relative path: files of commands, libraries and FMUs.
+    /// The files that controllers and perception programs name by a relative path: files of
+    /// commands, libraries and FMUs.
     pub files: Vec<ShippedFile>,
 }
 
@@ -41,11 +44,11 @@ impl Shipment {
     /// # Errors
     /// [`RemoteError::File`] if a file of a controller cannot be read.
     pub fn of(manifest: &Manifest) -> Result<Self, RemoteError> {
-        let hosted = |arm: &&ControllerChoice| matches!(arm, ControllerChoice::Hosted(_));
+        let is_hosted = |arm: &&ControllerChoice| matches!(arm, ControllerChoice::Hosted(_));
         let mut files: Vec<ShippedFile> = Vec::new();
         let programs = manifest.programs();
-        let of_programs = programs.iter().flat_map(|program| program_files(program, None));
-        for (name, path) in manifest.arms.iter().flat_map(named).chain(of_programs) {
+        let perception_files = programs.iter().flat_map(|program| program_files(program, None));
+        for (name, path) in manifest.arms.iter().flat_map(controller_files).chain(perception_files) {
             // A program that was found by the search path, or has an absolute path, is a matter of
             // each machine.
             if is_within(&name) && Path::new(&name) == path && files.iter().all(|file| file.name != name) {
@@ -57,7 +60,7 @@ impl Shipment {
         Ok(Self {
             version: manifest.closecall_version.clone(),
             manifest: serde_json::to_string(manifest)?,
-            controllers: manifest.arms.iter().filter(hosted).map(ToString::to_string).collect(),
+            controllers: manifest.arms.iter().filter(is_hosted).map(ToString::to_string).collect(),
             files,
         })
     }
@@ -87,8 +90,9 @@ impl Shipment {
     }
 }
 
-/// Returns the files that a controller names, as it names them and as this program finds them.
-fn named(controller: &ControllerChoice) -> Vec<(String, PathBuf)> {
+/// Returns the files that a controller names: each by the name it gives, and by the path at which
+/// this program finds the file.
+fn controller_files(controller: &ControllerChoice) -> Vec<(String, PathBuf)> {
     match (controller.exec(), controller.native()) {
         (Some(exec), _) => named_files(exec, None),
         (_, Some(native)) => vec![(native.path.clone(), PathBuf::from(&native.path))],

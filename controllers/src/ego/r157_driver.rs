@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The regulation describes a reaction ([`CarefulDriver`](crate::reference::CarefulDriver)), not a
-//! way to follow. The model leaves the following open; here it is decided as follows:
+//! way to follow. These choices are Closecall's own:
 //!
 //! - Without a risk, the driver follows by the law of [`Acc`](super::Acc), 2 s behind the lead
 //!   vehicle: the gap from which the reference driver starts in JRC-FSM's comparison of following.
@@ -50,7 +50,7 @@ impl R157Driver {
         Self { settings, following, lead: LeadVehicleSelector::default(), reaction: None, last_step: None }
     }
 
-    /// Returns true if there is a risk: see the module.
+    /// Returns true if there is a risk, as the documentation of the module defines it.
     fn is_at_risk(&self, speed_mps: f64, lead: &Front) -> bool {
         let closing_mps = speed_mps - lead.speed_mps;
         let required_mps2 = lead.required_braking_mps2(speed_mps, self.settings.acc.standstill_gap_m);

@@ -1,4 +1,5 @@
-//! Smoothing of a file while it is read: recorded tracks are dropped as soon as they are smoothed.
+//! Smooths the tracks of a file while it reads the file. Each recorded track is dropped as soon as
+//! it is smoothed, so memory does not grow with the recorded rows.
 
 use std::path::Path;
 
@@ -13,7 +14,7 @@ use crate::trajectory_data::{
 /// Number of track points among which overlaps are searched: 25 MiB.
 const STORED_POINTS: usize = 1 << 19;
 
-/// The smoothed tracks of a file, and what its reader has found besides.
+/// The smoothed tracks of a file, and the reader's findings about the file.
 #[derive(Clone, Debug)]
 pub struct SmoothedFile {
     /// The smoothed tracks.
@@ -22,14 +23,14 @@ pub struct SmoothedFile {
     pub flaws: FlawCounts,
     /// Time between two recorded frames.
     pub period: Time,
-    /// Whether a warning says that lane changes may be missing, or that the recorded lanes are
-    /// none.
+    /// Whether a warning says that lane changes may be missing, or that the recorded lane numbers
+    /// do not name lanes.
     pub is_in_doubt: bool,
-    /// Whether a warning says that the recorded lanes are none.
+    /// Whether a warning says that the recorded lane numbers do not name lanes.
     pub doubts_lanes: bool,
     /// Whether a warning says that left and right may be exchanged.
     pub doubts_sides: bool,
-    /// What a reader of results has to know of the file.
+    /// Messages about the file that belong beside every result of it.
     pub warnings: Vec<String>,
     /// BLAKE3 hash of the file content in hexadecimal digits.
     pub hash: String,
@@ -48,16 +49,22 @@ pub fn smooth_file(path: &Path, options: ReadOptions) -> Result<SmoothedFile, Tr
         Err(error) if !error.problem.needs_all_rows() => return Err(error),
         Ok(None) | Err(_) => {}
     }
-    let data = read_with(path, options)?;
-    let (flaws, warnings) = (count_flaws(&data), data.warnings());
-    let (is_in_doubt, doubts_lanes, doubts_sides) = (data.is_in_doubt, data.doubts_lanes, data.doubts_sides);
-    let (period, hash) = (data.period, data.hash.clone());
-    Ok(SmoothedFile { data: smooth(&data), flaws, period, is_in_doubt, doubts_lanes, doubts_sides, warnings, hash })
+    let recorded = read_with(path, options)?;
+    Ok(SmoothedFile {
+        data: smooth(&recorded),
+        flaws: count_flaws(&recorded),
+        period: recorded.period,
+        is_in_doubt: recorded.is_in_doubt,
+        doubts_lanes: recorded.doubts_lanes,
+        doubts_sides: recorded.doubts_sides,
+        warnings: recorded.warnings(),
+        hash: recorded.hash,
+    })
 }
 
 /// Smooths the tracks one by one. Returns `None` if the file has to be read as a whole.
 fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, TrajectoryFileError> {
-    // The export may hold several data sets, which are told apart after the last row.
+    // The export of NGSIM may hold several data sets, which only the last row tells apart.
     if file.layout() == Layout::Ngsim25 {
         return Ok(None);
     }
@@ -75,8 +82,14 @@ fn smooth_stream(mut file: Tracks<'_>) -> Result<Option<SmoothedFile>, Trajector
     tracks.sort_by_key(|track| track.trajectory.track_id);
     let markings = if file.states_markings() { file.markings().clone() } else { markings.finish() };
     let warnings = file.warnings().into_iter().chain(markings.ignored().iter().map(ToString::to_string)).collect();
-    let data = SmoothedTrajectoryData::new(&file.name(), markings, file.lanes(), tracks);
-    let (flaws, period, is_in_doubt) = (inspector.count_flaws(), file.period(), file.is_in_doubt());
-    let (doubts_lanes, doubts_sides, hash) = (file.doubts_lanes(), file.doubts_sides(), file.hash());
-    Ok(Some(SmoothedFile { data, flaws, period, is_in_doubt, doubts_lanes, doubts_sides, warnings, hash }))
+    Ok(Some(SmoothedFile {
+        data: SmoothedTrajectoryData::new(&file.name(), markings, file.lanes(), tracks),
+        flaws: inspector.count_flaws(),
+        period: file.period(),
+        is_in_doubt: file.is_in_doubt(),
+        doubts_lanes: file.doubts_lanes(),
+        doubts_sides: file.doubts_sides(),
+        warnings,
+        hash: file.hash(),
+    }))
 }

@@ -1,7 +1,8 @@
-//! Points of all tracks in the order of their times, sorted in temporary files.
+//! Sorts the points of all tracks by time, in temporary files.
 //!
 //! Tracks arrive one after the other, but a frame holds the vehicles of one instant. The points of
-//! five million rows take 270 MB, so that they are sorted in runs, which are then merged.
+//! five million rows would take 270 MB of memory. An external merge sort needs less: it sorts runs
+//! of points, writes each run to a file, and merges the runs.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,8 +15,12 @@ use closecall_traffic::{Time, TrajectoryPoint};
 /// Number of points of a run: 64 MB.
 const RUN_POINTS: usize = 1 << 20;
 
-/// Bytes of a point in a file.
-const POINT_BYTES: usize = 8 + 4 + 5 * 8 + 1;
+/// Offsets of the parts of a point in a file (bytes): time, track, five numbers, lane.
+const TRACK_AT: usize = 8;
+const NUMBERS_AT: usize = TRACK_AT + 4;
+const LANE_AT: usize = NUMBERS_AT + 5 * 8;
+/// Length of a point in a file (bytes).
+const POINT_BYTES: usize = LANE_AT + 1;
 
 /// A point of a track.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,21 +58,21 @@ impl LabelledPoint {
     }
 
     fn read(file: &mut impl Read) -> io::Result<Self> {
-        fn part<const N: usize>(bytes: &[u8; POINT_BYTES], from: usize) -> [u8; N] {
-            std::array::from_fn(|index| bytes[from + index])
+        fn part<const N: usize>(bytes: &[u8; POINT_BYTES], offset: usize) -> [u8; N] {
+            std::array::from_fn(|index| bytes[offset + index])
         }
         let mut bytes = [0; POINT_BYTES];
         file.read_exact(&mut bytes)?;
-        let number = |index: usize| f64::from_le_bytes(part(&bytes, 12 + 8 * index));
+        let number = |index: usize| f64::from_le_bytes(part(&bytes, NUMBERS_AT + 8 * index));
         Ok(Self {
             time: Time::from_ns(i64::from_le_bytes(part(&bytes, 0))),
-            track: u32::from_le_bytes(part(&bytes, 8)),
+            track: u32::from_le_bytes(part(&bytes, TRACK_AT)),
             s_m: number(0),
             d_m: number(1),
             speed_mps: number(2),
             acceleration_mps2: number(3),
             lateral_speed_mps: number(4),
-            lane: bytes[POINT_BYTES - 1],
+            lane: bytes[LANE_AT],
         })
     }
 }
@@ -78,7 +83,7 @@ struct Run {
     points: usize,
 }
 
-/// Gathers points.
+/// Gathers points in any order.
 pub(super) struct PointSorter {
     /// Folder of the temporary files.
     folder: PathBuf,
@@ -127,7 +132,7 @@ impl PointSorter {
     }
 }
 
-/// Points in order.
+/// One sorted run: the last one is still in memory.
 enum Source {
     Memory(std::vec::IntoIter<LabelledPoint>),
     File { file: BufReader<File>, left: usize },
@@ -146,7 +151,7 @@ impl Source {
     }
 }
 
-/// The merged runs.
+/// The merge of the sorted runs: an iterator over all points.
 pub(super) struct SortedPoints {
     sources: Vec<Source>,
     /// The next point of each source.
@@ -162,6 +167,7 @@ impl SortedPoints {
         self.advance(self.sources.len() - 1)
     }
 
+    /// Reads the next point of a source, and puts its key into the order.
     fn advance(&mut self, source: usize) -> io::Result<()> {
         let next = self.sources[source].next()?;
         self.order.extend(next.map(|point| Reverse((point.key(), source))));

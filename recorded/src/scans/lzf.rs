@@ -12,10 +12,17 @@ const LITERAL: u8 = 32;
 /// Value of the upper bits of a control byte at which the next byte is added to the length.
 const LONG: usize = 7;
 
-/// Decompresses data that has `size` bytes.
+/// Longest data for which memory is reserved before a byte is read (bytes): a damaged file may
+/// state any size.
+const MOST_RESERVED_BYTES: usize = 1 << 28;
+
+/// Decompresses data to exactly `size` bytes.
+///
+/// # Errors
+/// What is wrong with the compressed points, which the message calls "they".
 pub(super) fn decompress(compressed: &[u8], size: usize) -> Result<Vec<u8>, &'static str> {
     const CUT: &str = "they end too early";
-    let mut data: Vec<u8> = Vec::with_capacity(size.min(1 << 28));
+    let mut data: Vec<u8> = Vec::with_capacity(size.min(MOST_RESERVED_BYTES));
     let mut bytes = compressed;
     while let Some((&control, rest)) = bytes.split_first() {
         bytes = rest;
@@ -33,9 +40,9 @@ pub(super) fn decompress(compressed: &[u8], size: usize) -> Result<Vec<u8>, &'st
             let (&low, rest) = bytes.split_first().ok_or(CUT)?;
             bytes = rest;
             let distance = (usize::from(control & 31) << 8) + usize::from(low) + 1;
-            let from = data.len().checked_sub(distance).ok_or("a copy begins before the data")?;
-            // A copy may overlap its own output.
-            (from..from + length + 2).for_each(|index| data.push(data[index]));
+            let start = data.len().checked_sub(distance).ok_or("a copy begins before the data")?;
+            // The copied bytes may include bytes that this copy has just written.
+            (start..start + length + 2).for_each(|index| data.push(data[index]));
         }
         if data.len() > size {
             return Err("they are longer than stated");

@@ -61,7 +61,7 @@ pub struct TrajectoryData {
     /// Whether a warning says that lane changes may be wrong or missing, or that the recorded lanes
     /// are none.
     pub is_in_doubt: bool,
-    /// Whether a warning says that the recorded lanes are none.
+    /// Whether a warning says that the recorded lane numbers do not name lanes.
     pub doubts_lanes: bool,
     /// Whether a warning says that left and right may be exchanged.
     pub doubts_sides: bool,

@@ -1,4 +1,4 @@
-//! The three files of a highD or exiD data set: locating them and reading the metadata files.
+//! Finds the three files of a highD or exiD data set, and reads the two metadata files.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -51,7 +51,7 @@ impl FileSet {
         let folder = path.parent().map(Path::to_owned).unwrap_or_default();
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return Ok(None) };
         let bare = name.strip_suffix(GZ).unwrap_or(name);
-        let prefix = [TRACKS, TRACKS_META, RECORDING_META].iter().find_map(|end| bare.strip_suffix(end));
+        let prefix = [TRACKS, TRACKS_META, RECORDING_META].iter().find_map(|suffix| bare.strip_suffix(suffix));
         if let Some(prefix) = prefix {
             return Ok(Some(Self { folder, prefix: prefix.to_owned() }));
         }
@@ -98,14 +98,14 @@ impl FileSet {
 
     /// Returns the paths of all files of the set.
     pub(super) fn files(&self) -> [PathBuf; 3] {
-        [TRACKS, TRACKS_META, RECORDING_META].map(|end| self.path(end))
+        [TRACKS, TRACKS_META, RECORDING_META].map(|suffix| self.path(suffix))
     }
 
-    /// Returns the path of one file of the set. It is the compressed file if only that exists.
-    fn path(&self, end: &str) -> PathBuf {
-        let plain = self.folder.join(format!("{}{end}", self.prefix));
-        let packed = self.folder.join(format!("{}{end}{GZ}", self.prefix));
-        if !plain.exists() && packed.exists() { packed } else { plain }
+    /// Returns the path of the file with this suffix: the compressed file if only that one exists.
+    fn path(&self, suffix: &str) -> PathBuf {
+        let plain = self.folder.join(format!("{}{suffix}", self.prefix));
+        let compressed = self.folder.join(format!("{}{suffix}{GZ}", self.prefix));
+        if !plain.exists() && compressed.exists() { compressed } else { plain }
     }
 
     /// Reads the two metadata files. Their content enters the hash of the data set.
@@ -118,11 +118,11 @@ impl FileSet {
         })?;
         let mut vehicles = BTreeMap::new();
         let mut unknown_classes = UnknownClasses::default();
-        for (line, (id, vehicle, class)) in table(&tracks_path, digest, vehicle_meta)? {
+        for (line, VehicleRow { id, class, is_upper, rows }) in table(&tracks_path, digest, vehicle_row)? {
             let resolved = unknown_classes.resolve(class_named(&class), &class, "class");
             let class = resolved.map_err(|error| with_path(&tracks_path, ReadError::new(line, error)))?;
-            let vehicle = VehicleMeta { class, ..vehicle };
-            if let Some(VehicleMeta { line: first_line, .. }) = vehicles.insert(id, VehicleMeta { line, ..vehicle }) {
+            let vehicle = VehicleMeta { class, is_upper, rows, rows_read: 0, line };
+            if let Some(VehicleMeta { line: first_line, .. }) = vehicles.insert(id, vehicle) {
                 let problem = TrajectoryFileProblem::VehicleTwice { vehicle: id, first_line };
                 return Err(with_path(&tracks_path, ReadError::new(line, problem)));
             }
@@ -166,7 +166,17 @@ pub(super) struct VehicleMeta {
     pub(super) rows: u64,
     /// Number of rows read so far.
     pub(super) rows_read: u64,
+    /// Line of the entry, counted from 1.
     pub(super) line: u64,
+}
+
+/// One row of `NN_tracksMeta.csv` as it is written.
+struct VehicleRow {
+    id: u64,
+    /// Name of the class.
+    class: String,
+    is_upper: bool,
+    rows: u64,
 }
 
 /// One row of a metadata table, with the table's header.
@@ -256,8 +266,7 @@ fn markings(text: &str, column: &'static str) -> Result<Vec<f64>, FieldError> {
     Ok(edges_m)
 }
 
-/// Returns the number of a vehicle, its entry, and the name of its class.
-fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta, String), FieldError> {
+fn vehicle_row(cells: &Cells<'_>) -> Result<VehicleRow, FieldError> {
     let id = integer(cells.require(&["id", "trackId"])?, "id", allowed::IDS)?.unsigned_abs();
     let rows = integer(cells.require(&["numFrames"])?, "numFrames", ROWS)?.unsigned_abs();
     let class = cells.require(&["class"])?.to_owned();
@@ -269,7 +278,7 @@ fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta, String), FieldEr
             return Err(FieldError::at("drivingDirection", wrong_value(other, allowed)));
         }
     };
-    Ok((id, VehicleMeta { class: VehicleClass::Car, is_upper, rows, rows_read: 0, line: 0 }, class))
+    Ok(VehicleRow { id, class, is_upper, rows })
 }
 
 /// Returns the vehicle class with this name, if it is known. highD has cars and trucks; exiD spells

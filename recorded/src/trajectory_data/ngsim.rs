@@ -28,22 +28,22 @@ const STREET: [&str; 2] = ["Int_ID", "Section_ID"];
 /// The locations of the urban streets.
 const URBAN: [&str; 2] = ["lankershim", "peachtree"];
 
-/// Allowed values of the columns, in the units of the file.
-mod feet {
+/// Allowed values of the columns, in the units of the file: feet and milliseconds.
+mod limits {
     use super::{Bounds, FOOT_M, allowed};
 
     /// Converts a range from metres to feet, rounded to whole feet.
-    pub(super) const fn scaled(metres: Bounds) -> Bounds {
+    pub(super) const fn in_feet(metres: Bounds) -> Bounds {
         let Bounds { low, high, low_is_allowed } = metres;
         Bounds { low: (low / FOOT_M).round(), high: (high / FOOT_M).round(), low_is_allowed }
     }
 
-    pub(super) const POSITION: Bounds = scaled(allowed::POSITION_M);
-    pub(super) const LATERAL: Bounds = scaled(allowed::LATERAL_M);
-    pub(super) const SPEED: Bounds = scaled(allowed::SPEED_MPS);
-    pub(super) const ACCELERATION: Bounds = scaled(allowed::ACCELERATION_MPS2);
-    pub(super) const LENGTH: Bounds = scaled(allowed::LENGTH_M);
-    pub(super) const WIDTH: Bounds = scaled(allowed::WIDTH_M);
+    pub(super) const POSITION: Bounds = in_feet(allowed::POSITION_M);
+    pub(super) const LATERAL: Bounds = in_feet(allowed::LATERAL_M);
+    pub(super) const SPEED: Bounds = in_feet(allowed::SPEED_MPS);
+    pub(super) const ACCELERATION: Bounds = in_feet(allowed::ACCELERATION_MPS2);
+    pub(super) const LENGTH: Bounds = in_feet(allowed::LENGTH_M);
+    pub(super) const WIDTH: Bounds = in_feet(allowed::WIDTH_M);
     /// Milliseconds since 1970, up to the year 2100.
     pub(super) const TIME_MS: (i64, i64) = (0, 4_102_444_800_000);
 }
@@ -62,9 +62,9 @@ pub(super) struct NgsimColumns {
     acceleration: usize,
     lane: usize,
     location: Option<usize>,
-    /// Columns with the numbers of intersections and of street sections, which are 0 on motorways.
+    /// The columns [`STREET`], whose numbers are 0 on motorways.
     street: [Option<usize>; 2],
-    /// `true` if a row is of an urban street.
+    /// `true` if a row was recorded on an urban street.
     is_urban: bool,
 }
 
@@ -163,11 +163,11 @@ impl TextLayout for NgsimColumns {
             Ok(number(fields.get(line, index), name, bounds)? * FOOT_M)
         };
         let vehicle = whole(self.vehicle, "Vehicle_ID", allowed::IDS)?.unsigned_abs();
-        let length_m = metres(self.length, "v_Length", feet::LENGTH)?;
-        let front_m = metres(self.y, "Local_Y", feet::POSITION)?;
-        let right_m = metres(self.x, "Local_X", feet::LATERAL)?;
+        let length_m = metres(self.length, "v_Length", limits::LENGTH)?;
+        let front_m = metres(self.y, "Local_Y", limits::POSITION)?;
+        let right_m = metres(self.x, "Local_X", limits::LATERAL)?;
         let frame = whole(self.frame, "Frame_ID", allowed::FRAMES)?;
-        let time = Time::from_ms(whole(self.time, "Global_Time", feet::TIME_MS)?);
+        let time = Time::from_ms(whole(self.time, "Global_Time", limits::TIME_MS)?);
         let (origin, clock) = match self.location {
             Some(_) => (time - PERIOD * frame, Clock::Continuous),
             None => (Time::ZERO, Clock::MayRestart),
@@ -182,10 +182,10 @@ impl TextLayout for NgsimColumns {
             s_m: front_m - 0.5 * length_m,
             d_m: -right_m,
             lane: whole(self.lane, "Lane_ID", allowed::LANES)?.unsigned_abs() as u8,
-            speed_mps: metres(self.speed, "v_Vel", feet::SPEED)?,
-            acceleration_mps2: Some(metres(self.acceleration, "v_Acc", feet::ACCELERATION)?),
+            speed_mps: metres(self.speed, "v_Vel", limits::SPEED)?,
+            acceleration_mps2: Some(metres(self.acceleration, "v_Acc", limits::ACCELERATION)?),
             length_m,
-            width_m: metres(self.width, "v_Width", feet::WIDTH)?,
+            width_m: metres(self.width, "v_Width", limits::WIDTH)?,
             class: class(fields.get(line, self.class))?,
             marking_distances: MarkingDistances::default(),
             line: 0,

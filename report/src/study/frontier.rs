@@ -42,9 +42,14 @@ pub(super) fn cells(point: &Point) -> [String; 5] {
 pub(super) fn others(frontier: &Frontier) -> Option<String> {
     let of_point = |point: &Point| {
         let settings = frontier.keys.iter().zip(&point.values).map(|(key, value)| format!("{}={value}", short(key)));
-        format!("{} ({})", counted(point.of_others(), "sample"), settings.collect::<Vec<_>>().join(", "))
+        format!(
+            "{} ({})",
+            counted(point.collisions_of_others_only(), "sample"),
+            settings.collect::<Vec<_>>().join(", ")
+        )
     };
-    let counts: Vec<String> = frontier.points.iter().filter(|point| point.of_others() > 0).map(of_point).collect();
+    let counts: Vec<String> =
+        frontier.points.iter().filter(|point| point.collisions_of_others_only() > 0).map(of_point).collect();
     let tested = frontier.controllers.last().map_or("", String::as_str);
     (!counts.is_empty()).then(|| {
         format!(

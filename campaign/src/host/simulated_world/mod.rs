@@ -10,7 +10,7 @@
 //! clock are simulated. It runs a small campaign in a folder, interrupts and resumes it, and ends
 //! with a run without faults. Whatever happens,
 //!
-//! 1. an outcome in the journal is the one of its sample,
+//! 1. every outcome in the journal belongs to the sample under which it is filed,
 //! 2. no verdict and no baseline comes from a part of the samples,
 //! 3. no PASS hides a sample without an outcome,
 //! 4. a check that takes too long is no defect of the simulator, and runs again on request,
@@ -39,8 +39,8 @@ fn number_from_env(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number: `{text}`")))
 }
 
-/// Runs schedules, and returns the first violation by seed, with the number of schedules that met a
-/// fault.
+/// Runs one schedule for each seed. Returns the violation of the smallest seed that has one, and
+/// the number of schedules that met a fault.
 fn run(setup: &Setup, reader: Reader, seeds: std::ops::Range<u64>) -> (Option<(u64, Violation)>, usize) {
     let results: Vec<_> = seeds.into_par_iter().map(|seed| (seed, setup.run(seed, reader))).collect();
     let disturbed = results.iter().filter(|(_, result)| !matches!(result, Ok(0))).count();
@@ -66,8 +66,8 @@ fn no_schedule_files_a_wrong_outcome_or_hides_a_lost_one() {
     assert!(count == 1 || disturbed as u64 > count / 2, "{disturbed} of {count} schedules have a fault");
 }
 
-/// Without the check of the identity, an answer to another question is filed under the sample that
-/// was asked for.
+/// A client that does not compare the identity of an answer files the answer to an old question
+/// under the sample that it asks for now.
 #[test]
 fn a_client_that_believes_every_answer_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Believing, 0..2_000);
@@ -75,7 +75,7 @@ fn a_client_that_believes_every_answer_is_found_out() {
     assert!(matches!(violation, Violation::OtherOutcome { .. } | Violation::OwnJournalRefused { .. }), "{violation}");
 }
 
-/// Without the count of retries, a crash leaves no trace.
+/// If a client does not count retries, a crash leaves no trace.
 #[test]
 fn a_client_that_repeats_in_silence_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Silent, 0..2_000);
@@ -83,7 +83,7 @@ fn a_client_that_repeats_in_silence_is_found_out() {
     assert!(matches!(violation, Violation::SilentRetry { .. }), "{violation}");
 }
 
-/// With a time-out taken for a broken check, a slow machine makes a campaign invalid.
+/// If a client takes a time-out for a failed check, a slow machine makes a campaign invalid.
 #[test]
 fn a_client_that_takes_time_for_a_defect_is_found_out() {
     let (violation, _) = run(&Setup::new(), Reader::Blaming, 0..2_000);

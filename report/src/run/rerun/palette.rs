@@ -16,11 +16,11 @@ pub(super) const EGO: Rgba = [38, 116, 222, 255];
 pub(super) const FRONT: Rgba = [190, 98, 0, 255];
 /// The second of the other actors, by convention the rear vehicle.
 pub(super) const REAR: Rgba = [214, 40, 118, 255];
-/// A further vehicle that is relevant: it is grey, too, but paler, and has a name.
+/// A further relevant vehicle, which has a name: a paler grey than background traffic.
 const OTHER: Rgba = [176, 180, 186, 255];
-/// A vehicle of the traffic around.
+/// A vehicle of the background traffic.
 const BACKGROUND: Rgba = [118, 122, 128, 255];
-/// Colours of the moments of the encounter, in the views that mark them.
+/// Colours of the moments of the encounter, in the order of [`Moment::ALL`].
 const MOMENTS: [Rgba; 7] = [
     [214, 69, 65, 255],
     [98, 124, 186, 255],
@@ -30,9 +30,9 @@ const MOMENTS: [Rgba; 7] = [
     [104, 142, 72, 255],
     [130, 130, 140, 255],
 ];
-/// The ground in the view from above, and around the image of a camera. The viewer puts a label on
-/// a box through which the ground shines. In the light theme the box is bright, and only white on a
-/// black ground has enough contrast.
+/// The ground in the view from above, and around the image of a camera. The viewer draws a label on
+/// a translucent box. In the light theme the box is bright, so a white label has enough contrast
+/// only if the ground below the box is black.
 pub(super) const GROUND: Rgba = [0, 0, 0, 255];
 /// Fog in the scene.
 const FOG: Rgba = [118, 122, 128, 255];
@@ -50,8 +50,8 @@ pub(super) const BRAKE_LIGHT: Rgba = [255, 32, 24, 255];
 pub(super) const INDICATOR: Rgba = [255, 170, 0, 255];
 /// The sky by day, at dusk and at night.
 const SKY: [Rgba; 3] = [[112, 130, 150, 255], [62, 58, 84, 255], [9, 12, 22, 255]];
-/// Share of the light of the day that lies on the ground at dusk and at night. Vehicles stay
-/// legible.
+/// Brightness of the ground by day, at dusk and at night, as a share of the brightness by day.
+/// Vehicles stay legible.
 const GROUND_LIGHT: [f64; 3] = [1.0, 0.7, 0.45];
 pub(super) const BOX_FIT: Rgba = [255, 255, 255, 255];
 pub(super) const TRUTH: Rgba = [110, 214, 120, 255];
@@ -123,8 +123,8 @@ pub(super) fn moment(moment: Moment) -> Rgba {
     MOMENTS[index % MOMENTS.len()]
 }
 
-/// What follows an action of the ego stack, in a bar of states. It differs from the grey of a stack
-/// that does nothing.
+/// The time after an action of the ego stack, in a bar of states. It differs from the grey of the
+/// time in which the stack does nothing.
 pub(super) const AFTERWARDS: Rgba = [64, 80, 124, 255];
 
 /// White, in which the viewer writes on bars of states in both themes.
@@ -137,8 +137,8 @@ const LEAST_OF_TEXT: f64 = 4.5;
 /// Share by which a bar becomes darker in one step.
 const DARKER_STEP: f64 = 0.02;
 
-/// Returns a shade of a colour, for a bar of states: as dark as it must be for the white text on it
-/// in the light theme.
+/// Returns a shade of a colour for a bar of states: dark enough for white text in the light theme,
+/// and no darker.
 pub(super) fn bar(colour: Rgba) -> Rgba {
     let mut share = 1.0;
     loop {
@@ -156,7 +156,7 @@ fn scaled([red, green, blue, opacity]: Rgba, share: f64) -> Rgba {
     [darker(red), darker(green), darker(blue), opacity]
 }
 
-/// Returns the colour that the viewer shows of a bar in a theme with this background.
+/// Returns the colour in which the viewer shows a translucent bar in a theme with this background.
 fn shown_bar(bar: Rgba, background: Rgba) -> Rgba {
     std::array::from_fn(|channel| {
         let [bar, background] = [bar, background].map(|colour| f64::from(colour[channel]));
