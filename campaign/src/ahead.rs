@@ -31,7 +31,7 @@ const MOST_AHEAD: usize = 10_000;
 pub(crate) struct SampleKey {
     /// Index of its scenario in the campaign.
     pub(crate) work: usize,
-    /// Its number.
+    /// The number of the sample.
     pub(crate) sample: u64,
 }
 

@@ -37,9 +37,9 @@ pub enum EarlierError {
         path: PathBuf,
         /// What differs.
         subject: &'static str,
-        /// Its value in the earlier campaign.
+        /// The value in the earlier campaign.
         earlier: String,
-        /// Its value in this campaign.
+        /// The value in this campaign.
         current: String,
     },
     /// The earlier campaign ran other scenarios.

@@ -93,7 +93,7 @@ pub struct EndedEarly<'a> {
 /// The kept part of a campaign that has ended early.
 #[derive(Clone, Debug)]
 pub struct Kept<'a> {
-    /// Its folder.
+    /// The folder of the campaign.
     pub folder: &'a Path,
     /// The command line that started it.
     pub command: Vec<String>,

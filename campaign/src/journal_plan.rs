@@ -32,7 +32,7 @@ pub(crate) struct JournalPlan {
 struct Position {
     /// The index of its scenario.
     work: usize,
-    /// Its number.
+    /// The number of the sample.
     sample: u64,
 }
 

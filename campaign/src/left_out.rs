@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// A scenario that a campaign leaves out.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// Its name.
+    /// The name.
     pub scenario: String,
     /// The key that cannot act, and why.
     pub reason: String,

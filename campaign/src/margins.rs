@@ -43,9 +43,9 @@ pub struct MarginRegression {
     pub margin: String,
     /// The quantile: `min`, `p01`, `p05` or `p50`.
     pub quantile: String,
-    /// Its value in the baseline, in the unit of the margin.
+    /// The value in the baseline, in the unit of the margin.
     pub baseline: f64,
-    /// Its value in the later campaign, in the unit of the margin.
+    /// The value in the later campaign, in the unit of the margin.
     pub current: f64,
 }
 

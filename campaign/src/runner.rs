@@ -34,7 +34,7 @@ pub struct Work {
     /// The samples that are checked for validity.
     pub checks: CheckPlan,
     /// How often a sample runs again in a new process after its worker process has crashed or hung.
-    /// Its record then says that it is flaky.
+    /// The record of such a sample says that the sample is flaky.
     pub retry_crashed: u32,
 }
 

@@ -9,15 +9,15 @@ use super::fleet::FleetOf;
 /// One vehicle of a concrete scenario.
 #[derive(Clone, Debug)]
 pub struct Actor {
-    /// Its name.
+    /// The name.
     pub id: ActorId,
-    /// Its class, size and mass.
+    /// The class, size and mass.
     pub vehicle: Vehicle,
-    /// Its state at time zero.
+    /// The state at time zero.
     pub start: VehicleState,
-    /// Its driver: a human driver, or the ego stack.
+    /// The driver: a human driver, or the ego stack.
     pub driver: CheckedDriver,
-    /// Its lateral path, or `None` if it keeps the centre of its lane.
+    /// The lateral path, or `None` if it keeps the centre of its lane.
     pub path: Option<LateralPath>,
     /// How its driver weaves in the lane, or `None` if the driver keeps the lane exactly.
     pub lane_keeping: Option<LaneKeeping>,

@@ -30,7 +30,7 @@ const CUT_STEPS: f64 = 1e3;
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedFile {
     path: PathBuf,
-    /// Its provenance in words, with the hash of its content.
+    /// The provenance of the file in words, with the hash of the content.
     source: String,
     parameters: ParametersConfig,
     /// The parametric forms, if the file has any.

@@ -26,7 +26,7 @@ pub enum AxisError {
     /// The text has no key.
     #[error("`{text}` names no parameter: `NAME` or `KEY=LOW..HIGH` is needed")]
     NoKey {
-        /// The text found.
+        /// The given text.
         text: String,
     },
     /// The key has no range, and is no parameter that has one.

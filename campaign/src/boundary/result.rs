@@ -26,7 +26,7 @@ pub struct Boundary {
     pub quantity: String,
     /// The two parameters.
     pub keys: [String; 2],
-    /// Their ranges.
+    /// The ranges of the parameters.
     pub ranges: [[f64; 2]; 2],
     /// The runs, in their order.
     pub runs: Vec<Ran>,

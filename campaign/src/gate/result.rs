@@ -43,7 +43,7 @@ pub struct GateResult {
     pub expression: Expression,
     /// The origin of the gate.
     pub source: GateSource,
-    /// Its value and answer.
+    /// The value of the criterion, and the answer.
     pub evaluation: Evaluation,
 }
 

@@ -82,7 +82,7 @@ struct Task {
     version: String,
     /// The scenario file's path, to which the paths in it are relative.
     path: PathBuf,
-    /// Its content, with all settings applied.
+    /// The content of the scenario file, with all settings applied.
     text: String,
     sampling: Sampling,
     checks: CheckPlan,

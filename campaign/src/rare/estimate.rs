@@ -19,7 +19,7 @@ pub const COVERAGE: f64 = 0.95;
 pub struct Mean {
     /// The mean.
     pub value: f64,
-    /// Its standard error.
+    /// The standard error.
     pub standard_error: f64,
     /// Degrees of freedom of the standard error.
     pub degrees_of_freedom: f64,

@@ -259,7 +259,7 @@ pub(super) fn read_records(folder: &Path) -> Result<Vec<RareRecord>, FolderError
 #[derive(Debug)]
 struct KeptLine {
     record: RareRecord,
-    /// Its place in the file (bytes).
+    /// The offset of the line in the file (bytes).
     start: u64,
 }
 

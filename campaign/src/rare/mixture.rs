@@ -45,11 +45,11 @@ const STARTS: usize = 3;
 /// One component.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Component {
-    /// Its share of the mixture.
+    /// The share of the mixture.
     pub weight: f64,
-    /// Its mean in each dimension.
+    /// The mean in each dimension.
     pub mean: Vec<f64>,
-    /// Its standard deviation in each dimension.
+    /// The standard deviation in each dimension.
     pub sd: Vec<f64>,
 }
 
@@ -154,7 +154,7 @@ const MOST_LOG: f64 = 600.0;
 pub(super) struct Weighted<'a> {
     /// The points.
     pub(super) points: &'a [&'a [f64]],
-    /// Their weights, not negative.
+    /// The weights of the points, not negative.
     pub(super) weights: &'a [f64],
 }
 

@@ -46,7 +46,7 @@ pub struct Nearest {
     pub noise: u64,
     /// The events that happened.
     pub events: [bool; 2],
-    /// Its parameters.
+    /// The parameters.
     pub parameters: Parameters,
 }
 

@@ -76,7 +76,7 @@ pub enum RemoteError {
         scenario: String,
         /// Number of its samples.
         samples: usize,
-        /// Its first sample.
+        /// The first sample of the block.
         first: u64,
         /// What is wrong.
         message: String,

@@ -92,13 +92,13 @@ pub enum RangeError {
     /// The text is not of the form KEY=LOW..HIGH.
     #[error("`{text}` is not of the form KEY=LOW..HIGH, such as `actor.ego.driver.ego-stack.aeb.trigger-mps2=3..6`")]
     Form {
-        /// The text found.
+        /// The given text.
         text: String,
     },
     /// The bounds are not finite, or the upper one is not larger.
     #[error("`{text}`: two finite numbers are needed, the second larger than the first")]
     Bounds {
-        /// The text found.
+        /// The given text.
         text: String,
     },
 }

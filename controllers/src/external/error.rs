@@ -28,7 +28,7 @@ pub enum LoadError {
     Platform {
         /// The file.
         path: String,
-        /// Its platform.
+        /// The platform of the library.
         actual: String,
         /// The platform of this program.
         expected: String,
@@ -62,7 +62,7 @@ pub enum LoadError {
         path: String,
         /// The function.
         function: &'static str,
-        /// Its value.
+        /// The returned value.
         actual: i64,
         /// The allowed values.
         allowed: &'static str,

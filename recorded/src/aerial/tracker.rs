@@ -29,9 +29,9 @@ const ACROSS: AxisModel = AxisModel { jerk_density: 0.5, sigma_m: 0.2 };
 /// A vehicle on the ground, as a frame shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundDetection {
-    /// Its box.
+    /// The box.
     pub footprint: OrientedBox,
-    /// Its class.
+    /// The class.
     pub class: VehicleClass,
     /// Score of the detection (0 to 1).
     pub score: f64,

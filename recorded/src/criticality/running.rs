@@ -11,7 +11,7 @@ use crate::lane_change::LaneChange;
 /// A lane change with the lateral position at which it ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RunningChange {
-    /// Its first and last instant.
+    /// The first and last instant.
     span: [Time; 2],
     /// Lateral position at its end (m), or at the end of the track if that is earlier.
     end_m: f64,

@@ -28,11 +28,11 @@ const FOLLOWING_THW_S: f64 = 3.0;
 /// A vehicle of an approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Party {
-    /// Its track in the trajectory data.
+    /// The track in the trajectory data.
     pub track_id: u64,
-    /// Its class.
+    /// The class.
     pub class: VehicleClass,
-    /// Its size.
+    /// The size.
     pub dimensions: Dimensions,
 }
 

@@ -42,9 +42,9 @@ pub enum Lead {
 /// One vehicle of an encounter.
 #[derive(Clone, Debug)]
 pub struct Participant {
-    /// Its trajectory, in the frame of the encounter.
+    /// The trajectory, in the frame of the encounter.
     pub trajectory: Trajectory,
-    /// Its lane changes, with the time and the lane numbers of the trajectory data.
+    /// The lane changes, with the time and the lane numbers of the trajectory data.
     pub changes: Vec<LaneChange>,
 }
 

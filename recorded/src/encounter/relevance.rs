@@ -72,11 +72,11 @@ impl Variation {
 /// An approach that was chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relevant {
-    /// Its index among all approaches.
+    /// The index among all approaches.
     pub index: usize,
     /// Whether it is critical by at least one metric.
     pub is_critical: bool,
-    /// Its distance to the nearest earlier chosen approach, in standard deviations; `None` for the
+    /// The distance to the nearest earlier chosen approach, in standard deviations; `None` for the
     /// first.
     pub distance_sd: Option<f64>,
 }

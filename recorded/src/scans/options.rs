@@ -97,6 +97,6 @@ pub struct TakenScan {
     pub sensor: usize,
     /// The place of the scan in the recording.
     pub origin: Origin,
-    /// Its points.
+    /// The points of the scan.
     pub points: RecordedPoints,
 }

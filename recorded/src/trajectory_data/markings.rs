@@ -59,7 +59,7 @@ pub struct LaneMarkings {
 pub struct IgnoredMarking {
     /// The lane to the left of the marking.
     pub right_of_lane: u8,
-    /// Its lateral position (m).
+    /// The lateral position of the marking (m).
     pub d_m: f64,
     /// Number of lane changes from which its position derives.
     pub crossings: usize,

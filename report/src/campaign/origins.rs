@@ -41,7 +41,7 @@ pub struct Origins {
 /// A trajectory file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OriginFile {
-    /// Its path.
+    /// The path.
     pub path: String,
     /// BLAKE3 hash of its content.
     pub blake3: String,

@@ -16,7 +16,7 @@ pub(crate) struct BoundaryMap<'a> {
     pub(crate) title: &'a str,
     /// The names of the parameters.
     pub(crate) names: [&'a str; 2],
-    /// Their ranges.
+    /// The ranges of the parameters.
     pub(crate) ranges: [[f64; 2]; 2],
     /// The predicted margins: negative where the event happens. Empty without a surface.
     pub(crate) means: &'a [Vec<f64>],

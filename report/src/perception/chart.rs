@@ -26,7 +26,7 @@ const TICK_M: f64 = 25.0;
 
 /// The curves of a case of a study.
 pub(super) struct Line<'a> {
-    /// Its name in the legend.
+    /// The name in the legend.
     pub(super) name: String,
     /// The curves.
     pub(super) curve: &'a [CurvePoint],
@@ -46,7 +46,7 @@ impl Line<'_> {
 
 /// The content of a chart.
 pub(super) struct Chart {
-    /// Its title, with the unit.
+    /// The title, with the unit.
     pub(super) title: &'static str,
     /// The value at a point of a curve, if it has one.
     pub(super) value: fn(&CurvePoint) -> Option<f64>,

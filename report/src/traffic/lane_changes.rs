@@ -61,7 +61,7 @@ impl fmt::Display for ScoreText<'_> {
 pub struct CriticalityText<'a> {
     /// The file, whose tracks are smoothed.
     pub file: &'a SmoothedFile,
-    /// Its lane changes.
+    /// The lane changes of the file.
     pub changes: &'a [CriticalLaneChange],
     /// The lane changes to which the shares refer.
     pub counted: Counted,

@@ -14,7 +14,7 @@ use crate::run::film::{EncounterComparison, Film};
 pub struct Reenactment<'a> {
     /// The recorded encounter.
     pub encounter: &'a RecordedEncounter,
-    /// Its metrics, and the metrics of the run.
+    /// The metrics of the encounter, and the metrics of the run.
     pub comparison: &'a EncounterComparison,
     /// The film of the recorded traffic, and the film of the run.
     pub films: &'a [Film; 2],

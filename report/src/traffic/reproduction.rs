@@ -152,11 +152,11 @@ pub struct StepZero {
     pub encounter: RecordedEncounter,
     /// The calibrated driver.
     pub driver: Wiedemann99Config,
-    /// Its scenario.
+    /// The scenario of the encounter, with the calibrated driver.
     pub step: SampledEncounter,
     /// The recorded lane change.
     pub recorded: SampledRun,
-    /// Its run.
+    /// The run of the scenario.
     pub run: StepRun,
     /// How well it reproduces the recording.
     pub reproduction: Reproduction,

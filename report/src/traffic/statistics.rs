@@ -65,7 +65,7 @@ fn write_box(
 pub struct RecordedChanges {
     /// Name of the trajectory data.
     pub name: String,
-    /// Its lane changes.
+    /// The lane changes of the file.
     pub changes: Vec<CriticalLaneChange>,
 }
 

@@ -17,9 +17,9 @@ const NO_WIDTH_M: f64 = 0.1;
 /// An acceleration lane of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct EntryLane {
-    /// Its number.
+    /// The number.
     pub(super) id: i32,
-    /// Its full width (m).
+    /// The full width (m).
     pub(super) width_m: f64,
     pub(super) positions: AccelerationLane,
 }

@@ -30,7 +30,7 @@ pub struct StatedFault {
     pub group: SensorGroup,
     /// The sensor.
     pub sensor: String,
-    /// Its fault.
+    /// The fault of the sensor, in words.
     pub effects: String,
     /// Time of its begin (s); negative infinity if it holds from the start on.
     pub from_s: f64,

@@ -38,7 +38,7 @@ pub enum BeamFileError {
     /// The first line does not name the columns.
     #[error("the first line is `{actual}`, but `{}` is needed", HEADER)]
     Header {
-        /// The line found.
+        /// The line in the file.
         actual: String,
     },
     /// A line has another number of columns.
@@ -46,7 +46,7 @@ pub enum BeamFileError {
     Columns {
         /// Number of the line, counted from 1.
         line: usize,
-        /// The number of columns found.
+        /// The number of columns in the file.
         actual: usize,
     },
     /// A value is not a number, or out of its range.
@@ -56,7 +56,7 @@ pub enum BeamFileError {
         line: usize,
         /// Name of the column.
         column: &'static str,
-        /// The text found.
+        /// The text in the file.
         actual: String,
         /// What is allowed.
         allowed: Range,

@@ -164,7 +164,7 @@ pub struct Pattern {
     elevations: Vec<Vec<Elevation>>,
     /// Centre lines of all columns, for each mirror side.
     centre_lines: Vec<Vec<CentreLines>>,
-    /// Their bounds in each block of columns, for each mirror side.
+    /// Bounds of the centre lines in each block of columns, for each mirror side.
     line_bounds: Vec<Vec<LineBounds>>,
     /// Least cosine of the elevation of a beam.
     pub(crate) least_cosine: f32,

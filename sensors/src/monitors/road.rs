@@ -68,7 +68,7 @@ const MANY: u32 = 8;
 pub(crate) struct RoadHeight {
     /// Height (m).
     pub(crate) offset_m: f64,
-    /// Its standard deviation with a faultless sensor (m).
+    /// Standard deviation of the height with a faultless sensor (m).
     pub(crate) sd_m: f64,
     /// Range of the road (m).
     pub(crate) range_m: f64,

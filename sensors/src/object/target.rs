@@ -48,7 +48,7 @@ pub(super) struct Target {
     /// A random number from 0 to 1 for each piece of the road behind, which tells whether the
     /// vehicle is seen there.
     pub(super) pieces: [f64; PIECES],
-    /// Its errors in this weather.
+    /// The errors of the sensor in this weather.
     pub(super) errors: TargetErrors,
     pub(super) noise: TargetNoise,
     /// The track; `None` without one.

@@ -64,7 +64,7 @@ pub struct RadarScan<'a> {
 pub(super) struct MeasuredSpeed {
     /// Speed along the road (m/s).
     pub(super) speed_mps: f64,
-    /// Its standard deviation (m/s).
+    /// Standard deviation of the speed (m/s).
     pub(super) sd_mps: f64,
 }
 

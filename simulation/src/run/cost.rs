@@ -26,9 +26,9 @@ const CLOSING_TOLERANCE_MPS: f64 = 0.5;
 pub(super) struct Rear {
     /// Gap to the ego (m).
     pub(super) gap_m: f64,
-    /// Its speed (m/s).
+    /// Speed of the vehicle (m/s).
     pub(super) speed_mps: f64,
-    /// Its acceleration (m/s²).
+    /// Acceleration of the vehicle (m/s²).
     pub(super) acceleration_mps2: f64,
 }
 

@@ -11,9 +11,9 @@ use closecall_scenarios::outcome::{Collision, Phase};
 /// The lead vehicle of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lead {
-    /// Its index in the list of actors.
+    /// Index of the lead vehicle in the list of actors.
     pub actor: usize,
-    /// Its speed (m/s).
+    /// Speed of the lead vehicle (m/s).
     pub speed_mps: f64,
 }
 

@@ -19,7 +19,7 @@ use closecall_scenarios::outcome::Phase;
 pub(crate) struct Follower {
     /// Index of the vehicle in the list of actors.
     pub(crate) actor: usize,
-    /// Its time headway to the ego (s).
+    /// Time headway of the vehicle to the ego (s).
     pub(crate) thw_s: f64,
 }
 

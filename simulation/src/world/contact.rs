@@ -144,11 +144,11 @@ fn outward(shape: &OrientedBox, side: BoxSide) -> Vector2<f64> {
 /// A vehicle at the moment of a contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StruckVehicle<'a> {
-    /// Its box.
+    /// The box of the vehicle.
     pub(super) shape: &'a OrientedBox,
     /// The side that was struck.
     pub(super) side: BoxSide,
-    /// Its velocity in the plane (m/s).
+    /// The velocity of the vehicle in the plane (m/s).
     pub(super) velocity_mps: Vector2<f64>,
 }
 

@@ -31,13 +31,13 @@ pub(crate) struct Action {
 /// A vehicle as it enters the world.
 #[derive(Clone, Debug)]
 pub(crate) struct InitialVehicle {
-    /// Its name.
+    /// The name.
     pub(crate) id: ActorId,
-    /// Its class, size and mass.
+    /// The class, size and mass.
     pub(crate) vehicle: Vehicle,
-    /// Its state at time zero.
+    /// The state at time zero.
     pub(crate) state: VehicleState,
-    /// Its lateral path, or `None` if it keeps the centre of its lane.
+    /// The lateral path, or `None` if it keeps the centre of its lane.
     pub(crate) path: Option<LateralPath>,
     /// The lateral deviation of its driver, or `None` if the driver does not weave.
     pub(crate) weave: Option<Weave>,

@@ -24,11 +24,11 @@ const MOST_STEPS_TO_TWIN: i64 = 20;
 pub struct Offset {
     /// The parameter's name.
     pub name: String,
-    /// Its value in the smallest case, as text.
+    /// The value in the smallest case, as text.
     pub value: String,
-    /// Its value in the sample.
+    /// The value in the sample.
     pub sampled: String,
-    /// Its nominal value.
+    /// The nominal value.
     pub nominal: String,
     /// The value in words, with its unit.
     pub words: String,

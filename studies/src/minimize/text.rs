@@ -14,7 +14,7 @@ use super::{Minimized, MinimizedFiles, NearestFailure, WithoutOutcome};
 pub struct MinimizedText<'a> {
     /// The case.
     pub minimized: &'a Minimized,
-    /// Its files.
+    /// The files of the case.
     pub files: &'a MinimizedFiles,
     /// The commands that run them.
     pub command_for: CommandFor,

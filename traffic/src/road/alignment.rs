@@ -114,7 +114,7 @@ impl Displacement {
 pub struct AlignmentPiece {
     /// Position at which it begins (m).
     pub start_m: f64,
-    /// Its length (m).
+    /// Length of the piece (m).
     pub length_m: f64,
     /// Curvature at its start and at its end (1/m).
     pub curvatures_per_m: [f64; 2],

@@ -65,7 +65,7 @@ impl Fate {
 pub struct Point {
     /// The sample's number.
     pub sample: u64,
-    /// Its fate.
+    /// The fate of the sample.
     pub fate: Fate,
     /// The sampled values.
     pub parameters: Parameters,
@@ -78,7 +78,7 @@ pub struct Point {
 pub struct WorstSample {
     /// The sample's number.
     pub sample: u64,
-    /// Its fate.
+    /// The fate of the sample.
     pub fate: Fate,
     /// The ego's largest change of velocity (m/s); `None` if the ego did not collide.
     pub delta_v_mps: Option<f64>,

@@ -47,9 +47,9 @@ const IMAGE_DISTANCE_M: f32 = 1.2;
 pub(super) struct Pictures {
     /// Title of their view.
     pub(super) title: String,
-    /// Their entity.
+    /// The entity of the pictures.
     pub(super) entity: String,
-    /// Their size (px).
+    /// The size of the pictures (px).
     pub(super) size_px: [f64; 2],
 }
 

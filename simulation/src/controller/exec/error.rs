@@ -31,7 +31,7 @@ pub enum ExecError {
     /// The process ended.
     #[error("the process ended ({}) {}{}", how(*status), when(*answered), last_lines(stderr))]
     Ended {
-        /// Its exit status.
+        /// The exit status of the process.
         status: ExitStatus,
         /// Number of answers before, including the greeting.
         answered: u64,
@@ -41,7 +41,7 @@ pub enum ExecError {
     /// The process ended by a signal after its last answer.
     #[error("the process crashed ({}) after its last answer, when its input was closed{}", how(*status), last_lines(stderr))]
     BadEnd {
-        /// Its exit status.
+        /// The exit status of the process.
         status: ExitStatus,
         /// The last lines of its standard error.
         stderr: String,

@@ -36,7 +36,7 @@ const REST_STEPS: usize = 10;
 pub(crate) struct Step {
     /// True gap from the front of the vehicle to the ego's rear (m).
     pub(crate) gap_m: f64,
-    /// Its confirmed track, if there is one.
+    /// The confirmed track of the vehicle, if there is one.
     pub(crate) seen: Option<Seen>,
 }
 

@@ -88,7 +88,7 @@ const FAILED: &str = "failed";
 struct HealthRow {
     /// The name of its row.
     row: &'static str,
-    /// Its health in a frame.
+    /// The health of the group in a frame.
     health: fn(&Frame) -> Option<Health>,
     /// What its monitors have noticed.
     alarms: fn(&Frame) -> Alarms,
