@@ -250,9 +250,7 @@ fn a_folder_leaves_out_the_scenarios_whose_faults_cannot_act_and_does_not_pass()
     let why = "not run: camera-dead, camera-dirty: `fault.rear-camera` contradicts `sensors.mode`";
     assert!(report["reasons"][0].as_str().unwrap().starts_with(why), "{report:#}");
     assert!(message(&output).contains(why), "{}", message(&output));
-    let names: Vec<&str> =
-        report["scenarios"].as_array().unwrap().iter().map(|scenario| scenario["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["overtake-without-brake"]);
+    assert_eq!(report["scenarios"].as_object().unwrap().keys().collect::<Vec<_>>(), ["overtake-without-brake"]);
     // The folder of the results knows it: the campaign that goes on does not pass either.
     let again = json(&campaign("object", &["--resume", gate[0], gate[1]]), 4);
     assert_eq!(again["verdict"], "NOT JUDGED");

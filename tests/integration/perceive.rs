@@ -282,10 +282,11 @@ fn the_messages_of_ros_2_give_the_tracks_of_the_table() {
     }
 
     // Wrong messages are named by their topic and number.
-    let refused = |messages: &[(&str, &str, f64, Vec<u8>)]| {
+    let refused_with = |messages: &[(&str, &str, f64, Vec<u8>)], expected: i32| {
         write_mcap(&bag, None, messages);
-        refusal(&bag, &scenario)
+        refusal_with(&bag, &scenario, expected)
     };
+    let refused = |messages: &[(&str, &str, f64, Vec<u8>)]| refused_with(messages, 3);
     let changed = |index: usize, change: &dyn Fn(&mut Vec<u8>)| {
         let mut changed = messages.clone();
         change(&mut changed[index].3);
@@ -299,7 +300,7 @@ fn the_messages_of_ros_2_give_the_tracks_of_the_table() {
     let text = changed(3, &|data| data.truncate(90));
     assert!(text.contains("topic /odom, message 3") && text.contains("nav_msgs/msg/Odometry"), "{text}");
     let without_poses: Vec<_> = messages.iter().filter(|message| message.1 == POINTS).cloned().collect();
-    let text = refused(&without_poses);
+    let text = refused_with(&without_poses, 6);
     assert!(
         text.contains("drive.poses.csv") && text.contains("`time_s`, `x_m`, `y_m`, `yaw_rad`, `speed_mps`"),
         "{text}"

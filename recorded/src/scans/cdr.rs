@@ -159,3 +159,20 @@ pub(super) fn odometry(bytes: &[u8]) -> Result<Pose, ScanFileProblem> {
     // A standing vehicle may measure a speed below 0.
     Ok(Pose { time, at_m: [x_m, y_m], yaw_rad, speed_mps: speed_mps.max(0.0), yaw_rate_radps, on_road: None })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_in_a_frame_that_does_not_move_are_refused() {
+        for frame in ["map", "/odom", "earth"] {
+            let length = u8::try_from(frame.len() + 1).unwrap();
+            let mut message = vec![0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, length, 0, 0, 0];
+            message.extend_from_slice(frame.as_bytes());
+            message.push(0);
+            let error = point_cloud(&message).err().map(|problem| problem.to_string()).unwrap_or_default();
+            assert!(error.contains(&format!("its frame is `{frame}`")), "{error}");
+        }
+    }
+}
