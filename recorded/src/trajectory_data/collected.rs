@@ -197,6 +197,7 @@ impl Collected {
         let mirrored = facts.mirrored.or_else(|| is_mirrored.then_some(MIRRORED));
         let oncoming_side = road.as_ref().and_then(InferredRoad::oncoming_side);
         let names_sides = rows.iter().any(|row| row.position.names_sides());
+        let derives_lanes = road.as_ref().map_or(facts.layout == Layout::I24, |road| !road.names_lanes());
         let mut placed: Vec<Option<Row>> = vec![None; rows.len()];
         let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
         let mut jumps: Vec<LaneJump> = Vec::new();
@@ -224,14 +225,11 @@ impl Collected {
                 };
                 let Some(Placed { s_m, d_m, lane }) = place else { continue };
                 let vehicle_id = numbers[row.vehicle as usize];
-                // A vehicle that enters another road, or comes back to a recorded one, begins a track.
-                let begins = |(last, last_road, last_piece): &(Row, u32, u64)| {
-                    (*last_road, *last_piece) != (road_index, piece) || row.time - last.time > period + LONGEST_BRIDGE
-                };
-                if before.as_ref().is_some_and(begins) {
-                    visits += u64::from(matches!(row.position, Position::Road { .. }));
-                    before = None;
-                }
+                // A vehicle that enters another road begins a track. So does one after a gap, whose track is split later.
+                visits += u64::from(before.is_some_and(|(_, last_road, _)| last_road != road_index));
+                before = before.filter(|(last, last_road, last_piece)| {
+                    (*last_road, *last_piece) == (road_index, piece) && row.time - last.time <= period + LONGEST_BRIDGE
+                });
                 let row = Row {
                     number: vehicle_id + visits * PIECE_STRIDE,
                     origin: Time::ZERO,
@@ -282,14 +280,14 @@ impl Collected {
         let info = FileInfo { layout: facts.layout, name: None, period: Some(period), markings };
         let (items, unknown_classes) = (items.collect(), facts.unknown_classes);
         let lane_sides = LaneSides::default();
-        let road = RoadFacts { is_in_doubt, mirrored, names_sides, oncoming_side };
+        let road = RoadFacts { is_in_doubt, mirrored, names_sides, derives_lanes, oncoming_side };
         Ok(CollectedSource { items, info, notes, road, unknown_classes, lane_sides })
     }
 }
 
 /// Returns the speed at row `k` of `rows` of a vehicle (m/s), by the step before and the step after it.
 /// `step` returns the distance (m) and the time (s) between two rows. Where one of both steps is one that no
-/// vehicle makes, because a number was given to another vehicle, the other one gives the speed.
+/// vehicle makes, because a number was given to another vehicle, or one over a gap, the other one gives the speed.
 pub(super) fn derived_speed_mps(k: usize, rows: usize, step: impl Fn(usize, usize) -> (f64, f64)) -> f64 {
     let speed_mps = |from: usize, to: usize| {
         let (along_m, span_s) = step(from, to);
@@ -298,6 +296,10 @@ pub(super) fn derived_speed_mps(k: usize, rows: usize, step: impl Fn(usize, usiz
     let (before, after) = (k.saturating_sub(1), (k + 1).min(rows.saturating_sub(1)));
     if before < k && k < after {
         let (arriving_mps, leaving_mps) = (speed_mps(before, k), speed_mps(k, after));
+        let longer_s = step(k, after).1 - step(before, k).1;
+        if longer_s.abs() > LONGEST_BRIDGE.s() {
+            return if longer_s > 0.0 { arriving_mps } else { leaving_mps };
+        }
         if (leaving_mps - arriving_mps).abs() > JUMP_ALONG_MPS {
             return if arriving_mps.abs() < leaving_mps.abs() { arriving_mps } else { leaving_mps };
         }
@@ -425,7 +427,7 @@ fn infer_road(
                     let vehicle = pieces.number(row.moment(point, heading_rad, clock));
                     let last_lane = before.filter(|(vehicle, _)| *vehicle == row.vehicle).and_then(|(_, lane)| lane);
                     before = Some((row.vehicle, named_lane));
-                    // A file in another order than that of time cannot say who changes lanes, row by row.
+                    // A file that is not in order of time cannot say who changes lanes, row by row.
                     let changes_lane = match named_lane {
                         Some(StatedLane { edge, index: Some(index) }) => {
                             last_lane.is_some_and(|last| last.edge == edge && last.index != Some(index))
@@ -543,6 +545,8 @@ struct RoadFacts {
     mirrored: Option<&'static str>,
     /// `true` if the file states, apart from its positions, which lane is to the left.
     names_sides: bool,
+    /// `true` if the file states no lanes.
+    derives_lanes: bool,
     oncoming_side: Option<Side>,
 }
 
@@ -572,6 +576,10 @@ impl RowSource for CollectedSource {
 
     fn names_sides(&self) -> bool {
         self.road.names_sides
+    }
+
+    fn derives_lanes(&self) -> bool {
+        self.road.derives_lanes
     }
 
     fn oncoming_side(&self) -> Option<Side> {
@@ -608,5 +616,10 @@ mod tests {
         let braking = |from: usize, to: usize| (at_m[to] - at_m[from], 0.1 * (to - from) as f64);
         assert!((derived_speed_mps(1, 3, braking) - 15.0).abs() < 1e-9);
         assert_eq!(derived_speed_mps(0, 1, |_, _| (0.0, 0.0)).to_bits(), 0.0_f64.to_bits());
+        // After 3 s, another vehicle is 10 m further on.
+        let (at_m, at_s) = ([0.0, 2.0, 12.0, 15.0], [0.0, 0.1, 3.1, 3.2]);
+        let with_gap = |from: usize, to: usize| (at_m[to] - at_m[from], at_s[to] - at_s[from]);
+        assert!((derived_speed_mps(1, 4, with_gap) - 20.0).abs() < 1e-9);
+        assert!((derived_speed_mps(2, 4, with_gap) - 30.0).abs() < 1e-9);
     }
 }

@@ -21,9 +21,10 @@ use super::data::MarkingDistances;
 use super::fields::{Bounds, FieldError, integer, number};
 use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
+use super::mapped_rows::{MappedRow, MappedRows};
 use super::plain::allowed;
 use super::plane_pieces::PlaneMoment;
-use super::plane_steps::{MappedRows, PlaneSteps};
+use super::plane_steps::PlaneSteps;
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::xml::{Node, Xml};
@@ -261,7 +262,7 @@ impl<R: BufRead> CommonRoadSource<R> {
         let (number, period) = (obstacle.id, self.step.unwrap_or_default());
         let (vehicle, time, point, speed_mps) = (number, period * frame, (x_m, y_m), velocity_mps);
         let moment = PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock: Clock::Continuous };
-        self.mapped.add(position.is_on_map, speed_mps);
+        self.mapped.add(MappedRow { vehicle, time, point, heading_rad, speed_mps, place: position }, roads);
         self.steps.add(moment);
         Ok(Some(Row {
             number,
@@ -342,11 +343,20 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
     }
 
     fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
-        self.steps.check(Layout::Commonroad).map_err(ReadError::of_file)
+        let neighbours = self.roads.as_ref().map_or(Ok(()), Roads::check_neighbours);
+        neighbours.and_then(|()| self.steps.check(Layout::Commonroad)).map_err(ReadError::of_file)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.mapped.doubt_of_turns().into_iter().collect()
+    }
+
+    fn is_in_doubt(&self) -> bool {
+        self.mapped.doubt_of_turns().is_some()
     }
 
     fn map_doubt(&self) -> Option<String> {
-        self.mapped.doubt()
+        self.mapped.doubt_of_place()
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

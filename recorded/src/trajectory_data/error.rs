@@ -346,6 +346,15 @@ pub enum TrajectoryFileProblem {
         /// Share of these movements (%).
         percent: f64,
     },
+    /// The velocities of vehicles contradict their movements, and their headings do not.
+    #[error(
+        "in {percent:.0} % of the movements, a vehicle moves in another direction than its velocity states, by more than 30°, although \
+         its heading agrees: velocities have to be in the axes of the positions, and not in the axes of the vehicle"
+    )]
+    VelocitiesAgainstMotion {
+        /// Share of these movements (%).
+        percent: f64,
+    },
     /// No row belongs to the data set that is asked for.
     #[error("no row belongs to `{asked}`; the file holds {names}")]
     NoSuchLocation {
@@ -520,6 +529,17 @@ pub enum TrajectoryFileProblem {
         /// Number of vehicles.
         vehicles: usize,
     },
+    /// Neighbours of a map lie on the other side than it states.
+    #[error(
+        "in {contrary} of {all} pairs of lanes that the map states as neighbours, the right one lies to the left of the other: the file is \
+         mirrored, or the neighbours are exchanged"
+    )]
+    NeighboursAgainstPosition {
+        /// Number of these pairs.
+        contrary: usize,
+        /// Number of pairs.
+        all: usize,
+    },
     /// Vehicles drive against the road.
     #[error(
         "the position along the road falls in the direction of travel of {against} of {all} vehicles, such as vehicle {first}: \
@@ -541,7 +561,7 @@ pub enum TrajectoryFileProblem {
     /// The tracks fall to pieces.
     #[error(
         "the tracks of its {vehicles} vehicles fall into {pieces} pieces of {piece_s:.2} s on average, so that nothing can be \
-         followed: frames are missing throughout, or numbers are given to other vehicles"
+         followed: {cause}"
     )]
     Shreds {
         /// Number of vehicles.
@@ -550,6 +570,8 @@ pub enum TrajectoryFileProblem {
         pieces: u64,
         /// Mean duration of a piece (s).
         piece_s: f64,
+        /// The likely cause.
+        cause: String,
     },
     /// Vehicles move, but their speeds say that they hardly do.
     #[error(

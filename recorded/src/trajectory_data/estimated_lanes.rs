@@ -55,6 +55,17 @@ const LARGEST_OFFSET_M: f64 = 1.1;
 /// Number of rows that are evaluated.
 const ENOUGH_ROWS: usize = 50_000;
 
+/// The reason why the traffic shows no lanes.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub(super) enum NoLanesShown {
+    #[error("{vehicles} vehicles are too few, {} are needed", LEAST_VEHICLES)]
+    FewVehicles { vehicles: usize },
+    #[error("no lane width stands out: the resultant is {resultant:.2}, but {} is needed", LEAST_RESULTANT)]
+    NoWidth { resultant: f64 },
+    #[error("the vehicles of a carriageway drive in a single lane")]
+    SingleLane,
+}
+
 /// The lanes of one carriageway.
 #[derive(Clone, Debug, PartialEq)]
 struct Carriageway {
@@ -79,7 +90,7 @@ impl EstimatedLanes {
     ///
     /// # Errors
     /// The reason why the traffic shows no lanes.
-    pub(super) fn of(rows: &[Row]) -> Result<Self, String> {
+    pub(super) fn of(rows: &[Row]) -> Result<Self, NoLanesShown> {
         let every = rows.len().div_ceil(ENOUGH_ROWS).max(1);
         let mut positions: Vec<(f64, u64)> = rows.iter().step_by(every).map(|row| (row.d_m, row.number)).collect();
         positions.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -118,22 +129,20 @@ impl EstimatedLanes {
 
 impl Carriageway {
     /// Estimates the lanes of a carriageway from its positions, which fall to the right.
-    fn of(positions: &[(f64, u64)], first_lane: u8, is_first: bool) -> Result<Self, String> {
+    fn of(positions: &[(f64, u64)], first_lane: u8, is_first: bool) -> Result<Self, NoLanesShown> {
         let vehicles: BTreeSet<u64> = positions.iter().map(|(_, vehicle)| *vehicle).collect();
         if vehicles.len() < LEAST_VEHICLES {
-            return Err(format!("{} vehicles are too few, {LEAST_VEHICLES} are needed", vehicles.len()));
+            return Err(NoLanesShown::FewVehicles { vehicles: vehicles.len() });
         }
         // To the right, as lanes are counted.
         let right_m: Vec<f64> = positions.iter().map(|(d_m, _)| -d_m).collect();
         let Period { resultant, width_m, phase_m } = Period::of(&right_m, WIDTHS_M);
         if !(resultant >= LEAST_RESULTANT) {
-            return Err(format!(
-                "no lane width stands out: the resultant is {resultant:.2}, but {LEAST_RESULTANT} is needed"
-            ));
+            return Err(NoLanesShown::NoWidth { resultant });
         }
         let modes_m = modes(&right_m, width_m, phase_m);
         if modes_m.len() < 2 {
-            return Err("the vehicles of a carriageway drive in a single lane".to_owned());
+            return Err(NoLanesShown::SingleLane);
         }
         let offset_m = if is_first { offset(&modes_m, width_m) } else { None };
         let markings_m = modes_m.windows(2).map(|pair| -(0.5 * (pair[0] + pair[1]) - offset_m.unwrap_or(0.0)));

@@ -382,6 +382,10 @@ impl TextLayout for ExidColumns {
         self.columns.lane_offset.is_some()
     }
 
+    fn derives_lanes(&self) -> bool {
+        !self.road.names_lanes()
+    }
+
     fn oncoming_side(&self) -> Option<Side> {
         self.road.oncoming_side()
     }

@@ -108,7 +108,7 @@ const AXIS_TURNS: usize = 3;
 
 /// Cosine of the smallest angle between two directions of one road, 150° (-).
 const OPPOSITE: f64 = -0.866;
-/// Largest distance to the other carriageway (m): that of a motorway with a wide median. An assumption with
+/// Largest distance to the other carriageway (m), as on a motorway with a wide median. An assumption with
 /// a plausible range of 30 to 100 m.
 const OTHER_CARRIAGEWAY_M: f64 = 60.0;
 /// Share of the oncoming rows that are on one side of a direction (-): a road that turns back may have some on the
@@ -228,6 +228,8 @@ pub(super) struct InferredRoad {
     is_mirrored: bool,
     /// The side on which vehicles pass the oncoming traffic, if the data show it.
     oncoming_side: Option<Side>,
+    /// `true` if rows name their lanes.
+    names_lanes: bool,
 }
 
 /// The path of one vehicle.
@@ -268,10 +270,16 @@ impl InferredRoad {
             let heading_rad = path.heading_rad;
             Some(Direction { reference: path.vehicle, ..Direction::along(line, heading_rad) })
         });
-        let directions: Vec<Direction> = directions.collect();
-        let states_lane_width = stated_width_m.is_some();
-        let (astray, doubts, is_mirrored, oncoming_side) = (0.0, Vec::new(), false, None);
-        let mut road = Self { lane_width_m, states_lane_width, directions, astray, doubts, is_mirrored, oncoming_side };
+        let mut road = Self {
+            lane_width_m,
+            states_lane_width: stated_width_m.is_some(),
+            directions: directions.collect(),
+            astray: 0.0,
+            doubts: Vec::new(),
+            is_mirrored: false,
+            oncoming_side: None,
+            names_lanes: false,
+        };
         if road.directions.is_empty() {
             return Ok(Err(TrajectoryFileProblem::NothingMoves));
         }
@@ -333,6 +341,7 @@ impl InferredRoad {
                     observed.add_position(pose.vehicle, lane, &projection);
                 }
             })?;
+            self.names_lanes = names_lanes;
             if !names_lanes {
                 self.doubt_few_paths(each_row)?;
                 return self.find_unnamed_axes(each_row);
@@ -521,6 +530,11 @@ impl InferredRoad {
     /// Returns `true` if lanes with higher indices lie further to the right.
     pub(super) fn is_mirrored(&self) -> bool {
         self.is_mirrored
+    }
+
+    /// Returns `true` if rows name their lanes.
+    pub(super) fn names_lanes(&self) -> bool {
+        self.names_lanes
     }
 
     /// Returns the side on which vehicles pass the oncoming traffic, if the data show it.

@@ -2,7 +2,8 @@
 //!
 //! Lanes are numbered by their names, so that both agree unless names were joined wrongly. A vehicle
 //! may change lanes exactly where one name ends and the next begins. No row states such a lane change,
-//! but the vehicle moves sideways.
+//! but the vehicle moves sideways. If a file states a lane change wherever a name ends, most vehicles keep their
+//! lanes there, and do not move sideways.
 
 /// Distance before and after a change of lanes over which a vehicle moves sideways (m): half of a lane
 /// change of 6 s at 33 m/s. In slow traffic the distance is shorter.
@@ -14,6 +15,10 @@ const LEAST_SHIFT: f64 = 0.5;
 /// One in this number of lane changes may contradict the file before a result is in doubt. An
 /// assumption with a plausible range of 5 to 20.
 const ONE_WRONG_IN: u64 = 10;
+
+/// One in this number of lane changes that the file states may come without a movement sideways: where a ramp ends
+/// in the lane beside it, a vehicle goes straight on. An assumption with a plausible range of 2 to 10.
+const ONE_UNMOVED_IN: u64 = 4;
 
 /// Number of lane changes without a movement sideways that may have another cause: a track may end
 /// soon after its vehicle changes lanes where one name ends and the next begins.
@@ -43,6 +48,10 @@ pub(super) struct LaneComparison {
     unstated: u64,
     /// Lane changes that the file states and that are none on the derived road.
     unfollowed: u64,
+    /// Lane changes that the file states while rows show whether the vehicle moves sideways, and those without such a
+    /// movement.
+    shown: u64,
+    unmoved: u64,
 }
 
 impl LaneComparison {
@@ -63,7 +72,10 @@ impl LaneComparison {
             stated += u64::from(row.changes_lane && !before.changes_lane);
             if before.lane != row.lane {
                 derived += 1;
-                unstated += u64::from(!row.changes_lane && !moves_sideways(&rows, k, lane_width_m));
+                let Sideways { moves, is_shown } = Sideways::about(&rows, k, lane_width_m);
+                unstated += u64::from(!row.changes_lane && !moves);
+                self.shown += u64::from(row.changes_lane && is_shown);
+                self.unmoved += u64::from(row.changes_lane && is_shown && !moves);
             }
         }
         self.stated += stated;
@@ -75,7 +87,7 @@ impl LaneComparison {
 
     /// Returns why the lanes on the derived road are in doubt.
     pub(super) fn doubts(&self) -> Vec<String> {
-        let Self { stated, derived, unstated, unfollowed, .. } = *self;
+        let Self { stated, derived, unstated, unfollowed, shown, unmoved, .. } = *self;
         let is_many = |wrong: u64, all: u64| ONE_WRONG_IN * wrong > all;
         let mut doubts = Vec::new();
         if unstated > FEW_UNSTATED && is_many(unstated, derived) {
@@ -90,16 +102,34 @@ impl LaneComparison {
                  its lanes were not followed"
             ));
         }
+        if unmoved > FEW_UNSTATED && ONE_UNMOVED_IN * unmoved > shown {
+            doubts.push(format!(
+                "in {unmoved} of {shown} lane changes that the file states, the vehicle does not move sideways: what states them (in \
+                 exiD `laneChange`) is wrong, or the positions are"
+            ));
+        }
         doubts
     }
 }
 
-/// Returns `true` if a vehicle moves by most of a lane about the change of lanes after row `k`.
-fn moves_sideways(rows: &[ComparedRow], k: usize, lane_width_m: f64) -> bool {
-    let at_m = rows[k].s_m;
-    let before = rows[..=k].iter().rev().find(|row| row.s_m <= at_m - CHANGING_M).or(rows.first());
-    let after = rows[k..].iter().find(|row| row.s_m >= at_m + CHANGING_M).or(rows.last());
-    before.zip(after).is_some_and(|(before, after)| (after.d_m - before.d_m).abs() >= LEAST_SHIFT * lane_width_m)
+/// The movement of a vehicle to the side about a change of lanes.
+struct Sideways {
+    /// `true` if the vehicle moves by most of a lane.
+    moves: bool,
+    /// `true` if its rows reach as far as a lane change may, before and after.
+    is_shown: bool,
+}
+
+impl Sideways {
+    /// Returns the movement about the change of lanes after row `k`.
+    fn about(rows: &[ComparedRow], k: usize, lane_width_m: f64) -> Self {
+        let at_m = rows[k].s_m;
+        let before = rows[..=k].iter().rev().find(|row| row.s_m <= at_m - CHANGING_M);
+        let after = rows[k..].iter().find(|row| row.s_m >= at_m + CHANGING_M);
+        let ends = before.or(rows.first()).zip(after.or(rows.last()));
+        let moves = ends.is_some_and(|(from, to)| (to.d_m - from.d_m).abs() >= LEAST_SHIFT * lane_width_m);
+        Self { moves, is_shown: before.is_some() && after.is_some() }
+    }
 }
 
 #[cfg(test)]
@@ -133,5 +163,6 @@ mod tests {
         assert_eq!(doubts(true, false, 3.5), [""; 0], "they change lanes where a name ends");
         assert!(doubts(true, false, 0.3)[0].starts_with("10 of 10 lane changes on the road"));
         assert!(doubts(false, true, 3.5)[0].starts_with("10 of 10 lane changes that the file states"));
+        assert!(doubts(true, true, 0.3)[0].starts_with("in 10 of 10 lane changes that the file states, the vehicle"));
     }
 }

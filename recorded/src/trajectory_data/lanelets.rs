@@ -19,6 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::{Lane, maths};
 
+use super::error::TrajectoryFileProblem;
 use super::markings::LaneMarkings;
 use super::reference_line::{Point, Projection, ReferenceLine};
 
@@ -38,10 +39,21 @@ pub(super) struct Lanelet {
     pub(super) successors: Vec<i64>,
 }
 
+/// A lanelet in the plane.
+#[derive(Clone, Debug)]
+struct MappedLanelet {
+    id: i64,
+    outline: Vec<Point>,
+    successors: Vec<i64>,
+}
+
 /// The roads of a scenario.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Roads {
     roads: Vec<Road>,
+    /// Number of pairs of lanelets beside each other, and of those that lie on the other side than stated.
+    pairs: usize,
+    contrary_pairs: usize,
 }
 
 /// A position on one of the roads.
@@ -64,8 +76,8 @@ struct Road {
     /// Outlines of the lanelets beside the reference line, each with its lane, counted from 1 at
     /// the left.
     lanes: Vec<(u8, Vec<Point>)>,
-    /// Outlines of all lanelets of the road.
-    outlines: Vec<Vec<Point>>,
+    /// All lanelets of the road.
+    lanelets: Vec<MappedLanelet>,
     /// Right edge of each lane beside the reference line (m).
     right_edges_m: Vec<f64>,
     /// Offset of the lane numbers, so that roads share no lane.
@@ -90,7 +102,21 @@ impl Roads {
             first_lane = first_lane.saturating_add(lanes).saturating_add(1);
             shift_m += width_m - SEPARATION_M;
         }
-        Self { roads }
+        let pairs = neighbours(lanelets);
+        let contrary_pairs = pairs.iter().filter(|(left, right)| lies_to_the_left(right, left)).count();
+        Self { roads, pairs: pairs.len(), contrary_pairs }
+    }
+
+    /// Checks the sides of neighbours.
+    ///
+    /// # Errors
+    /// Most of them lie on the other side than the map states.
+    pub(super) fn check_neighbours(&self) -> Result<(), TrajectoryFileProblem> {
+        let Self { pairs: all, contrary_pairs: contrary, .. } = *self;
+        if 2 * contrary > all {
+            return Err(TrajectoryFileProblem::NeighboursAgainstPosition { contrary, all });
+        }
+        Ok(())
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -134,12 +160,31 @@ impl Roads {
         let is_on_map = inside.is_some() || self.roads.iter().any(|road| road.holds(point));
         Some(RoadPosition { s_m, d_m: d_m + road.shift_m, lane, heading_rad, is_on_map })
     }
+
+    /// Returns `true` if a vehicle that drives from `before` to `point` stays on its lanelet, or goes on to one that
+    /// continues it.
+    pub(super) fn goes_on(&self, before: Point, point: Point) -> bool {
+        let at = |point: Point| self.roads.iter().flat_map(move |road| road.lanelets_at(point));
+        let here: Vec<i64> = at(point).map(|lanelet| lanelet.id).collect();
+        at(before).any(|lanelet| [lanelet.id].iter().chain(&lanelet.successors).any(|id| here.contains(id)))
+    }
+}
+
+impl MappedLanelet {
+    fn new(id: i64, lanelet: &Lanelet) -> Self {
+        Self { id, outline: outline(lanelet), successors: lanelet.successors.clone() }
+    }
 }
 
 impl Road {
+    /// Returns its lanelets at `point`.
+    fn lanelets_at(&self, point: Point) -> impl Iterator<Item = &MappedLanelet> {
+        self.lanelets.iter().filter(move |lanelet| contains(&lanelet.outline, point))
+    }
+
     /// Returns `true` if one of its lanelets is at `point`.
     fn holds(&self, point: Point) -> bool {
-        self.outlines.iter().any(|outline| contains(outline, point))
+        self.lanelets_at(point).next().is_some()
     }
 
     /// Returns the lane whose middle is nearest to `d_m`.
@@ -155,6 +200,25 @@ impl Road {
         }
         nearest.1
     }
+}
+
+/// Returns the pairs of lanelets beside each other, the left one first, as they are stated.
+fn neighbours(lanelets: &BTreeMap<i64, Lanelet>) -> Vec<(&Lanelet, &Lanelet)> {
+    let of_right = lanelets.values().filter_map(|left| Some((left, lanelets.get(&left.right_id?)?)));
+    let of_left = lanelets.values().filter_map(|right| Some((lanelets.get(&right.left_id?)?, right)));
+    of_right.chain(of_left).collect()
+}
+
+/// Returns `true` if a lanelet lies to the left of another one.
+fn lies_to_the_left(lanelet: &Lanelet, of: &Lanelet) -> bool {
+    let middle = |lanelet: &Lanelet| {
+        let points = || lanelet.left.iter().chain(&lanelet.right);
+        let count = points().count() as f64;
+        (points().map(|point| point.0).sum::<f64>() / count, points().map(|point| point.1).sum::<f64>() / count)
+    };
+    let (Some(first), Some(last)) = (of.left.first(), of.left.last()) else { return false };
+    let (here, there) = (middle(of), middle(lanelet));
+    (last.0 - first.0) * (there.1 - here.1) - (last.1 - first.1) * (there.0 - here.0) > 0.0
 }
 
 /// Groups the lanelets that are linked as successors or lie side by side.
@@ -199,7 +263,7 @@ fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, 
     let mut road = Road {
         line,
         lanes: Vec::new(),
-        outlines: ids.iter().filter_map(|id| lanelets.get(id)).map(outline).collect(),
+        lanelets: ids.iter().filter_map(|id| Some(MappedLanelet::new(*id, lanelets.get(id)?))).collect(),
         right_edges_m: Vec::new(),
         first_lane: 0,
         shift_m: 0.0,

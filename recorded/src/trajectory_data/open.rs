@@ -128,8 +128,12 @@ pub fn open_from<'a>(
     window: usize,
 ) -> Result<Tracks<'a>, TrajectoryFileError> {
     let digest = Digest::default();
-    let input = digest.input(source).map_err(|error| with_path(path, error))?;
-    let source = if is_trace(path) { trace(input, &options) } else { reader_for(input, &options) };
+    let mut input = digest.input(source).map_err(|error| with_path(path, error))?;
+    let is_trace = is_trace(path) && {
+        let start = input.fill_buf().map_err(|error| with_path(path, ReadError::of_file(io_problem(error))))?;
+        !start.starts_with(MCAP)
+    };
+    let source = if is_trace { trace(input, &options) } else { reader_for(input, &options) };
     let source = source.map_err(|error| with_path(path, error))?;
     Tracks::new(path, digest, source, options, window)
 }

@@ -431,13 +431,17 @@ fn in_plane<'a>(mut text: OpenLabelText) -> Result<Box<dyn RowSource + 'a>, Read
                     (along_m, (instants[after] - instants[before]).s())
                 })
             };
-            let speed_mps = row.speed_mps.get().unwrap_or_else(derived);
+            let speed_mps = match row.speed_mps.get() {
+                Some(stated_mps) => checked(&path, "the speed", stated_mps, SPEED_MPS)?,
+                // A step to another vehicle of the same name is refused as such later.
+                None => derived().clamp(SPEED_MPS.low, SPEED_MPS.high),
+            };
             let vehicle = collected.vehicle(&text.objects[row.object as usize].uid);
             collected.push(Ok(CollectedRow {
                 vehicle,
                 time: instants[k],
                 position: Position::Plane { point, heading_rad, changes_lane: false, named_lane: None },
-                speed_mps: checked(&path, "the speed", speed_mps, SPEED_MPS)?,
+                speed_mps,
                 acceleration_mps2: acceleration_mps2(&path, row)?,
                 length_m: checked(&path, "the length of the cuboid", row.length_m, allowed::LENGTH_M)?,
                 width_m: checked(&path, "the width of the cuboid", row.width_m, allowed::WIDTH_M)?,
@@ -498,6 +502,34 @@ mod tests {
         let message = error.problem.to_string();
         assert!(message.contains("`openlabel.frames.1.objects.7.object_data.num` has no `lane`"), "{message}");
         assert!(!error.affects_one_row());
+    }
+
+    #[test]
+    fn two_vehicles_of_one_name_in_a_frame_are_the_reason_of_a_refusal_and_not_their_speed() {
+        let cuboid = |x_m: f64| {
+            format!(
+                r#""7": {{"object_data": {{"cuboid": [{{"coordinate_system": "world",
+                "val": [{x_m}, 0, 0, 0, 0, 0, 4.5, 1.8, 1.5]}}]}}}}"#
+            )
+        };
+        let frame = |frame: i32| {
+            let (first, second) = (cuboid(2.0 * f64::from(frame)), cuboid(300.0 + 2.0 * f64::from(frame)));
+            let time_s = 0.1 * f64::from(frame);
+            format!(r#""{frame}": {{"frame_properties": {{"timestamp": {time_s}}}, "objects": {{{first}, {second}}}}}"#)
+        };
+        let frames: Vec<String> = (0..20).map(frame).collect();
+        let text = format!(
+            r#"{{"openlabel": {{"metadata": {{"schema_version": "{}"}}, "coordinate_systems": {{"world": {{"type": "scene_cs"}}}},
+            "objects": {{"7": {{"type": "car"}}}}, "frames": {{{}}}}}}}"#,
+            names::SCHEMA_VERSION,
+            frames.join(", ")
+        );
+        let error = match read(text.as_bytes(), LaneReliability::Unreliable) {
+            Err(error) => error,
+            Ok(mut rows) => std::iter::from_fn(|| rows.next_row().transpose()).find_map(Result::err).unwrap(),
+        };
+        let problem = error.problem;
+        assert!(matches!(problem, TrajectoryFileProblem::SharedNumber { vehicle: 7, .. }), "{problem}");
     }
 
     #[test]

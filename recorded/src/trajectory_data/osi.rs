@@ -28,10 +28,12 @@ use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, shown};
 use super::file_layout::Layout;
 use super::lanelets::{Lanelet, Roads};
+use super::mapped_rows::{MappedRow, MappedRows};
 use super::osi_messages::{Messages, refused};
 use super::plain::allowed;
 use super::plane_pieces::PlaneMoment;
-use super::plane_steps::{MappedRows, PlaneSteps};
+use super::plane_steps::PlaneSteps;
+use super::plausible::MIN_SPEED_MPS;
 use super::reference_line::Point;
 use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use crate::lane_change::LaneReliability;
@@ -47,6 +49,8 @@ const LONGEST_S: i64 = 4_102_444_800;
 
 /// Largest number of vehicles whose roads are remembered.
 const MAX_VEHICLES: usize = 4_000_000;
+/// Number of messages that show the usual time between two.
+const FIRST_MESSAGES: usize = 20;
 /// Largest number of points of all lane boundaries, as of CommonRoad's lanelets.
 const MAX_POINTS: usize = 200_000;
 
@@ -78,6 +82,9 @@ struct OsiReader<R> {
     /// Number of messages read.
     count: u64,
     left_out: u64,
+    has_vehicles: bool,
+    /// Time of the latest message, and the position of each of its vehicles.
+    latest: Option<(Time, BTreeMap<u64, Point>)>,
 }
 
 /// Reads a file of `messages`.
@@ -88,7 +95,7 @@ pub(super) fn read<'a, R: BufRead + 'a>(
     messages: Messages<R>,
     lanes: LaneReliability,
 ) -> Result<Box<dyn RowSource + 'a>, ReadError> {
-    let mut reader = OsiReader { messages, first: None, count: 0, left_out: 0 };
+    let mut reader = OsiReader { messages, first: None, count: 0, left_out: 0, has_vehicles: false, latest: None };
     let Some(first) = reader.next()? else { return Err(ReadError::of_file(TrajectoryFileProblem::Empty)) };
     let roads = Roads::from_lanelets(&lanelets(&first)?);
     reader.first = Some(first);
@@ -97,8 +104,10 @@ pub(super) fn read<'a, R: BufRead + 'a>(
             reader,
             roads,
             road_of: BTreeMap::new(),
+            first: VecDeque::new(),
+            frames: None,
             rows: VecDeque::new(),
-            steps: PlaneSteps::default(),
+            motion: Motion::default(),
             mapped: MappedRows::default(),
         }));
     }
@@ -124,7 +133,15 @@ impl<R: BufRead> OsiReader<R> {
 
     /// Returns the vehicles of the next message.
     fn next_vehicles(&mut self) -> Result<Option<Vec<Observed>>, ReadError> {
-        let Some(message) = self.next()? else { return Ok(None) };
+        let Some(message) = self.next()? else {
+            if !self.has_vehicles && self.left_out > 0 {
+                return Err(refused(format!(
+                    "none of its {} moving objects has the `type` of a vehicle",
+                    self.left_out
+                )));
+            }
+            return Ok(None);
+        };
         let number = self.count - 1;
         let wrong = |what: &str| refused(format!("message {number}: {what}"));
         let stamp = message.timestamp.as_ref().ok_or_else(|| wrong("it has no `timestamp`"))?;
@@ -147,6 +164,17 @@ impl<R: BufRead> OsiReader<R> {
             let base = object.base.as_ref().ok_or_else(|| refused(format!("{place}: `base` is missing")))?;
             let kind = object.vehicle_classification.as_ref().and_then(|class| class.r#type);
             vehicles.push(observed(&place, base, id, time, number, class_of(kind))?);
+        }
+        self.has_vehicles |= !vehicles.is_empty();
+        let points: BTreeMap<u64, Point> = vehicles.iter().map(|vehicle| (vehicle.number, vehicle.point)).collect();
+        if let Some((before, points_before)) = self.latest.replace((time, points))
+            && before == time
+            && vehicles.iter().any(|vehicle| points_before.get(&vehicle.number).is_some_and(|at| *at != vehicle.point))
+        {
+            return Err(wrong(&format!(
+                "`timestamp` is {} s as in the message before, but vehicles are at other places: time has to go on",
+                time.s()
+            )));
         }
         Ok(Some(vehicles))
     }
@@ -279,9 +307,78 @@ struct OsiSource<R> {
     roads: Roads,
     /// The road of each vehicle, by its number.
     road_of: BTreeMap<u64, usize>,
+    /// The vehicles of the first messages, whose frames are not yet counted.
+    first: VecDeque<Vec<Observed>>,
+    /// The frames of messages; known after the first messages.
+    frames: Option<Frames>,
     rows: VecDeque<Row>,
-    steps: PlaneSteps,
+    motion: Motion,
     mapped: MappedRows,
+}
+
+/// The frames of messages, by their times: messages may be missing.
+struct Frames {
+    /// Usual time between two messages.
+    usual: Time,
+    /// Time and frame of the latest message.
+    latest: Option<(Time, i64)>,
+}
+
+impl Frames {
+    /// Takes the usual time between two messages from the `times` of the first ones.
+    fn new(times: &[Time]) -> Self {
+        let mut steps: Vec<Time> =
+            times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > Time::ZERO).collect();
+        steps.sort_unstable();
+        Self { usual: steps.get(steps.len() / 2).copied().unwrap_or(Time::from_ms(100)), latest: None }
+    }
+
+    /// Returns the frame of the next message, which is at `time`.
+    fn at(&mut self, time: Time) -> i64 {
+        let frame = self.latest.map_or(0, |(before, frame)| {
+            let (step, half) = (time - before, Time::from_ns(self.usual.ns() / 2));
+            let steps = (step + half).ns().div_euclid(self.usual.ns()).clamp(-allowed::FRAMES.1, allowed::FRAMES.1);
+            // An early message has a frame of its own.
+            allowed::FRAMES.1.min(frame + if step > Time::ZERO { steps.max(1) } else { steps })
+        });
+        self.latest = Some((time, frame));
+        frame
+    }
+}
+
+/// The movements of vehicles, compared with their headings and with their velocities.
+#[derive(Default)]
+struct Motion {
+    headings: PlaneSteps,
+    velocities: PlaneSteps,
+}
+
+impl Motion {
+    /// Adds a vehicle, and returns its speed (m/s).
+    fn add(&mut self, vehicle: &Observed) -> f64 {
+        let Observed { number, time, point, heading_rad, velocity_mps, .. } = *vehicle;
+        let speed_mps = Observed::along(velocity_mps, heading_rad);
+        let moment = PlaneMoment { vehicle: number, time, point, heading_rad, speed_mps, clock: Clock::Continuous };
+        self.headings.add(moment);
+        let (x_mps, y_mps) = velocity_mps;
+        if maths::hypot(x_mps, y_mps) > MIN_SPEED_MPS {
+            self.velocities.add(PlaneMoment { heading_rad: maths::atan2(y_mps, x_mps), ..moment });
+        }
+        speed_mps
+    }
+
+    /// Checks the axes of the velocities. Other axes are a reason why speeds contradict the positions, too.
+    ///
+    /// # Errors
+    /// The velocities contradict the movements, and the headings do not.
+    fn check_velocities(&self) -> Result<(), ReadError> {
+        match (self.velocities.contradicted_percent(), self.headings.contradicted_percent()) {
+            (Some(percent), None) => {
+                Err(ReadError::of_file(TrajectoryFileProblem::VelocitiesAgainstMotion { percent }))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 impl<R: BufRead> RowSource for OsiSource<R> {
@@ -294,20 +391,31 @@ impl<R: BufRead> RowSource for OsiSource<R> {
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.reader.notes()
+        self.reader.notes().into_iter().chain(self.mapped.doubt_of_turns()).collect()
+    }
+
+    fn is_in_doubt(&self) -> bool {
+        self.mapped.doubt_of_turns().is_some()
+    }
+
+    fn check_velocities(&self) -> Result<(), ReadError> {
+        self.motion.check_velocities()
     }
 
     fn check_sides(&self, _is_mirrored: bool) -> Result<(), ReadError> {
-        self.steps.check(Layout::Osi).map_err(ReadError::of_file)
+        let neighbours = self.roads.check_neighbours();
+        neighbours.and_then(|()| self.motion.headings.check(Layout::Osi)).map_err(ReadError::of_file)
     }
 
     fn map_doubt(&self) -> Option<String> {
-        self.mapped.doubt()
+        self.mapped.doubt_of_place()
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         while self.rows.is_empty() {
-            let Some(vehicles) = self.reader.next_vehicles()? else { return Ok(None) };
+            let Some(vehicles) = self.next_vehicles()? else { return Ok(None) };
+            let frame =
+                vehicles.first().zip(self.frames.as_mut()).map_or(0, |(vehicle, frames)| frames.at(vehicle.time));
             for vehicle in vehicles {
                 let Observed { number, point, heading_rad, .. } = vehicle;
                 let road = match self.road_of.get(&number) {
@@ -322,16 +430,17 @@ impl<R: BufRead> RowSource for OsiSource<R> {
                     }
                 };
                 let Some(place) = self.roads.locate(road, point) else { continue };
-                let (time, clock) = (vehicle.time, Clock::Continuous);
-                let speed_mps = Observed::along(vehicle.velocity_mps, heading_rad);
-                self.mapped.add(place.is_on_map, speed_mps);
-                self.steps.add(PlaneMoment { vehicle: number, time, point, heading_rad, speed_mps, clock });
+                let speed_mps = self.motion.add(&vehicle);
+                self.mapped.add(
+                    MappedRow { vehicle: number, time: vehicle.time, point, heading_rad, speed_mps, place },
+                    &self.roads,
+                );
                 let along = |vector| Observed::along(vector, place.heading_rad);
                 self.rows.push_back(Row {
                     number,
                     origin: Time::ZERO,
                     vehicle_id: number,
-                    frame: i64::try_from(vehicle.message).unwrap_or(i64::MAX),
+                    frame,
                     time: vehicle.time,
                     clock: Clock::Continuous,
                     s_m: place.s_m,
@@ -351,12 +460,34 @@ impl<R: BufRead> RowSource for OsiSource<R> {
     }
 }
 
+impl<R: BufRead> OsiSource<R> {
+    /// Returns the vehicles of the next message. Reads some messages ahead at first, which show the usual time
+    /// between two.
+    fn next_vehicles(&mut self) -> Result<Option<Vec<Observed>>, ReadError> {
+        if self.frames.is_none() {
+            while self.first.len() < FIRST_MESSAGES
+                && let Some(vehicles) = self.reader.next_vehicles()?
+            {
+                self.first.push_back(vehicles);
+            }
+            let times: Vec<Time> = self.first.iter().filter_map(|vehicles| Some(vehicles.first()?.time)).collect();
+            self.frames = Some(Frames::new(&times));
+        }
+        match self.first.pop_front() {
+            Some(vehicles) => Ok(Some(vehicles)),
+            None => self.reader.next_vehicles(),
+        }
+    }
+}
+
 /// Reads the rows of a file that states no lanes.
 fn in_plane<'a, R: BufRead + 'a>(mut reader: OsiReader<R>) -> Result<Box<dyn RowSource + 'a>, ReadError> {
     let mut collected = Collected::default();
+    let mut motion = Motion::default();
     while let Some(vehicles) = reader.next_vehicles()? {
         for vehicle in vehicles {
             let Observed { point, heading_rad, .. } = vehicle;
+            motion.add(&vehicle);
             let along = |vector| Observed::along(vector, heading_rad);
             let index = collected.vehicle(&vehicle.number.to_string());
             collected.push(Ok(CollectedRow {
@@ -372,6 +503,7 @@ fn in_plane<'a, R: BufRead + 'a>(mut reader: OsiReader<R>) -> Result<Box<dyn Row
             }))?;
         }
     }
+    motion.check_velocities()?;
     Ok(Box::new(collected.into_source(Facts {
         layout: Layout::Osi,
         clock: Clock::Continuous,

@@ -35,7 +35,10 @@ pub(super) enum Messages<R> {
 
 impl<R: BufRead> Messages<R> {
     pub(super) fn of_mcap(input: R) -> Self {
-        let options = LinearReaderOptions::default().with_record_length_limit(MAX_MESSAGE_BYTES);
+        let options = LinearReaderOptions::default()
+            .with_record_length_limit(MAX_MESSAGE_BYTES)
+            .with_validate_chunk_crcs(true)
+            .with_validate_data_section_crc(true);
         let (reader, schemas, topics) = (LinearReader::new_with_options(options), BTreeMap::new(), BTreeMap::new());
         Self::Mcap(Box::new(McapMessages { input, reader, schemas, topics, read: None, others: Vec::new() }))
     }

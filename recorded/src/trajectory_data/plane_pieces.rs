@@ -13,6 +13,7 @@ use closecall_traffic::{Time, maths};
 
 use super::builder::PIECE_STRIDE;
 use super::continuity::{JUMP_ACROSS_M, JUMP_ACROSS_MPS, JUMP_ALONG_M, JUMP_ALONG_MPS, compared_until};
+use super::plausible::MIN_SPEED_MPS;
 use super::reference_line::Point;
 use super::source::Clock;
 
@@ -20,6 +21,10 @@ use super::source::Clock;
 /// in a lane change it stays below 10°. Headings of some files have errors of a few degrees, which move a
 /// fast vehicle to the side between two frames that are far apart.
 const LEAST_ASKEW: f64 = 0.5;
+
+/// Length of the sum of two headings that are 90° apart (-). A vehicle that drives does not turn by more between two
+/// rows: another one drives in the opposite direction.
+const TURNED: f64 = std::f64::consts::SQRT_2;
 
 /// A vehicle in a plane at one time.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +67,9 @@ fn is_jump(before: &PlaneMoment, row: &PlaneMoment) -> bool {
     let cos = heading.iter().map(|rad| maths::cos(*rad)).sum::<f64>();
     let sin = heading.iter().map(|rad| maths::sin(*rad)).sum::<f64>();
     let norm = maths::hypot(cos, sin);
-    if !(norm > 0.0) {
+    // The mean of two headings that point to opposite sides is across both.
+    let is_driving = before.speed_mps > MIN_SPEED_MPS && row.speed_mps > MIN_SPEED_MPS;
+    if !(norm > if is_driving { TURNED } else { 0.0 }) {
         return true;
     }
     let along_m = (dx * cos + dy * sin) / norm;
@@ -117,6 +124,23 @@ mod tests {
             assert_eq!(pieces((-200.0, 0.0), heading_rad, 2.0), 2, "a vehicle that enters");
             assert_eq!(pieces((0.0, 0.0), heading_rad, 60.0), 2, "long after");
         }
+    }
+
+    #[test]
+    fn a_number_that_goes_to_the_oncoming_traffic_begins_a_piece() {
+        // 12 m beside the path of the vehicle before, after a pause in which that could be driven.
+        let pieces = |speed_mps: f64, heading_rad: f64| {
+            let mut numbers = PlanePieces::default();
+            let moment = |time_s: f64, left_m: f64, heading_rad: f64| {
+                let (time, point, clock) = (Time::from_s(time_s), (speed_mps * time_s, left_m), Clock::Continuous);
+                PlaneMoment { vehicle: 7, time, point, heading_rad, speed_mps, clock }
+            };
+            let first = numbers.number(moment(0.0, 0.0, 0.02));
+            1 + usize::from(numbers.number(moment(5.0, 12.0, heading_rad)) != first)
+        };
+        assert_eq!(pieces(20.0, 3.1), 2);
+        assert_eq!(pieces(20.0, 1.5), 1, "a turn in 5 s");
+        assert_eq!(pieces(0.0, 3.1), 1, "the heading of a vehicle that stands may point anywhere");
     }
 
     #[test]

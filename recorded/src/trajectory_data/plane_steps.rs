@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 use closecall_traffic::maths;
 use closecall_traffic::statistics::quantiles::median;
 
-use super::axes::MISPLACED;
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
 use super::plane_pieces::PlaneMoment;
@@ -33,35 +32,6 @@ const MOST_TURNED: f64 = 0.866;
 /// same for both carriageways contradict half of them; numbers that jump from vehicle to vehicle contradict
 /// single ones. An assumption with a plausible range of 0.05 to 0.4.
 const CONTRADICTED: f64 = 0.2;
-/// Share of the rows of moving vehicles off the lanes of the map above which the file is in doubt (-). If the map
-/// is shifted by a lane, a fifth to a half of the traffic is off it; on shoulders drive single vehicles. An assumption
-/// with a plausible range of 0.05 to 0.2.
-const OFF_MAP: f64 = 0.1;
-
-/// The rows of moving vehicles that a map has lanes for.
-#[derive(Debug, Default)]
-pub(super) struct MappedRows {
-    off_map: usize,
-    all: usize,
-}
-
-impl MappedRows {
-    /// Adds a row: whether a lane of the map is there, and the speed (m/s).
-    pub(super) fn add(&mut self, is_on_map: bool, speed_mps: f64) {
-        if speed_mps.abs() > MIN_SPEED_MPS {
-            self.off_map += usize::from(!is_on_map);
-            self.all += 1;
-        }
-    }
-
-    /// Returns the doubt about the lanes if many vehicles drive beside all of them.
-    pub(super) fn doubt(&self) -> Option<String> {
-        let share = self.off_map as f64 / self.all.max(1) as f64;
-        (self.all >= LEAST_STEPS && share > OFF_MAP).then(|| {
-            format!("in {:.0} % of the rows, a vehicle drives beside the lanes of the map: {MISPLACED}", 100.0 * share)
-        })
-    }
-}
 
 /// The steps of vehicles between two rows.
 #[derive(Debug, Default)]
@@ -109,11 +79,16 @@ impl PlaneSteps {
         if self.ratios.len() >= MIN_STEPS {
             check_ratio(median(self.ratios.clone()), layout)?;
         }
-        let share = self.against as f64 / self.movements.max(1) as f64;
-        if self.movements >= LEAST_STEPS && share > CONTRADICTED {
-            return Err(TrajectoryFileProblem::HeadingsAgainstMotion { percent: 100.0 * share });
+        match self.contradicted_percent() {
+            Some(percent) => Err(TrajectoryFileProblem::HeadingsAgainstMotion { percent }),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Returns the share of the movements that contradict the headings (%), if it is too large.
+    pub(super) fn contradicted_percent(&self) -> Option<f64> {
+        let share = self.against as f64 / self.movements.max(1) as f64;
+        (self.movements >= LEAST_STEPS && share > CONTRADICTED).then_some(100.0 * share)
     }
 }
 
@@ -152,18 +127,5 @@ mod tests {
             let problem = drive(heading_rad).unwrap_err();
             assert!(matches!(problem, TrajectoryFileProblem::HeadingsAgainstMotion { .. }), "{problem}");
         }
-    }
-
-    #[test]
-    fn a_map_is_in_doubt_if_much_of_the_moving_traffic_is_off_it() {
-        let doubt = |off_map: usize, speed_mps: f64| {
-            let mut rows = MappedRows::default();
-            (0..100).for_each(|row| rows.add(row >= off_map, speed_mps));
-            rows.doubt()
-        };
-        assert!(doubt(25, 20.0).unwrap().contains("in 25 % of the rows"));
-        assert!(doubt(25, -20.0).is_some());
-        assert_eq!(doubt(7, 20.0), None, "single vehicles on the shoulder");
-        assert_eq!(doubt(25, 0.0), None, "vehicles that stand");
     }
 }

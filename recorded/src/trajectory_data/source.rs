@@ -86,6 +86,14 @@ pub(super) trait RowSource {
         false
     }
 
+    /// Checks that the velocities of the rows so far have the axes of the positions.
+    ///
+    /// # Errors
+    /// They have others.
+    fn check_velocities(&self) -> Result<(), ReadError> {
+        Ok(())
+    }
+
     /// Checks that the columns which are not read agree with the lateral position, which is mirrored
     /// if `is_mirrored`, in the rows so far.
     ///
@@ -112,6 +120,11 @@ pub(super) trait RowSource {
     /// Returns `true` if the file states, apart from its positions, which lane is to the left.
     fn names_sides(&self) -> bool {
         true
+    }
+
+    /// Returns `true` if rows are in the lanes at their positions, because the file states no lanes and has no map.
+    fn derives_lanes(&self) -> bool {
+        false
     }
 
     /// Returns the side on which vehicles pass the oncoming traffic, if the positions show it.

@@ -131,6 +131,10 @@ impl<R: BufRead> RowSource for TextSource<R> {
         self.format.columns.names_sides()
     }
 
+    fn derives_lanes(&self) -> bool {
+        self.format.columns.derives_lanes()
+    }
+
     fn oncoming_side(&self) -> Option<Side> {
         self.format.columns.oncoming_side()
     }

@@ -52,6 +52,11 @@ pub(super) trait TextLayout {
         true
     }
 
+    /// Returns `true` if rows are in the lanes at their positions, because the file states no lanes and has no map.
+    fn derives_lanes(&self) -> bool {
+        false
+    }
+
     /// Returns the side on which vehicles pass the oncoming traffic, if the positions show it.
     fn oncoming_side(&self) -> Option<Side> {
         None

@@ -10,10 +10,11 @@ use super::axes::{self, Axes, AxisOptions};
 use super::builder::TrackBuilder;
 use super::class_names::UnknownClass;
 use super::collected::is_lane_jump;
+use super::common_crossings;
 use super::continuity::{Continuity, FrameClock};
 use super::data::{RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
-use super::estimated_lanes::EstimatedLanes;
+use super::estimated_lanes::{EstimatedLanes, NoLanesShown};
 use super::file_layout::Layout;
 use super::frame_times::{self, Ticks};
 use super::input::Digest;
@@ -53,6 +54,10 @@ const LEAST_BAD_ROWS: u64 = 20;
 /// One in this number of rows may be left out because its number belongs to another vehicle, too, before lane changes
 /// are missing. An assumption with a plausible range of 20 to 1,000.
 const ONE_SHARED_IN: u64 = 100;
+
+/// The doubt about a road that was derived from traffic without lanes.
+const NO_LANES_ALONG_THE_ROAD: &str = "the vehicles drive in no lanes along the road that was derived from the traffic: the road is another one, and a \
+     lateral shift may be no lane change";
 
 /// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -153,6 +158,8 @@ pub struct Tracks<'a> {
     lane_doubt: Option<String>,
     /// Why the times, the positions or the speeds are in doubt.
     speed_doubt: Option<String>,
+    /// Why lanes that the positions show are in doubt.
+    crossing_doubt: Option<String>,
     /// What shows which side is left.
     sides: Sides,
     /// `true` if the file is of a simulation, in which a lane change may take a single step.
@@ -161,7 +168,7 @@ pub struct Tracks<'a> {
     jumps_to_lanes: bool,
     lanes: LaneReliability,
     /// The lanes that are estimated from the traffic, or the reason why they cannot be.
-    estimated: Option<Result<EstimatedLanes, String>>,
+    estimated: Option<Result<EstimatedLanes, NoLanesShown>>,
     builder: TrackBuilder,
     /// Rows of the window that are not yet in the builder, in their documented directions.
     window: std::vec::IntoIter<Row>,
@@ -203,6 +210,7 @@ impl<'a> Tracks<'a> {
             axis_warning: None,
             lane_doubt: None,
             speed_doubt: None,
+            crossing_doubt: None,
             sides: Sides::Shown,
             is_simulated: false,
             jumps_to_lanes: false,
@@ -296,7 +304,8 @@ impl<'a> Tracks<'a> {
     /// Returns `true` if a warning on the file or on the rows so far says that lane changes may be
     /// wrong or missing, or that the recorded lanes are none.
     pub fn is_in_doubt(&self) -> bool {
-        let is_of_file = self.doubts_lanes() || self.speed_doubt.is_some() || self.source.is_in_doubt();
+        let doubts = [&self.lane_doubt, &self.speed_doubt, &self.crossing_doubt];
+        let is_of_file = doubts.iter().any(|doubt| doubt.is_some()) || self.source.is_in_doubt();
         let are_missing = ONE_SHARED_IN * self.dropped.of_shared_numbers() > self.rows;
         is_of_file || are_missing || self.sides.is_doubt() || self.is_coarse() || self.continuity().hides_lane_changes()
     }
@@ -345,12 +354,14 @@ impl<'a> Tracks<'a> {
         });
         let coarse = self.is_coarse().then(|| coarse_frames(self.mean_period()));
         let sides = self.sides.warning().map(str::to_owned);
-        let doubts = self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).cloned().chain(sides);
+        let doubts =
+            self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).chain(&self.crossing_doubt);
+        let doubts = doubts.cloned().chain(sides);
         let shared = self.dropped.of_shared_numbers();
         let shared = (shared > 0).then(|| {
             format!(
                 "{shared} of {} rows were left out because their vehicle is at another place in the same frame: a number belongs to \
-                 several vehicles, of which only one is read",
+                 several vehicles, and only one of them is read",
                 self.rows
             )
         });
@@ -531,6 +542,12 @@ impl<'a> Tracks<'a> {
             self.estimated = Some(EstimatedLanes::of(&rows[..rows.len().min(WINDOW_ROWS)]));
             rows.iter_mut().for_each(|row| self.assign_lane(row));
         }
+        let is_estimated = matches!(self.estimated, Some(Ok(_)));
+        if is_estimated || (self.lanes == LaneReliability::Reliable && self.source.derives_lanes()) {
+            self.crossing_doubt = common_crossings::doubt(&rows[..rows.len().min(WINDOW_ROWS)]);
+        } else if matches!(self.estimated, Some(Err(NoLanesShown::NoWidth { .. }))) && self.source.derives_lanes() {
+            self.crossing_doubt = Some(NO_LANES_ALONG_THE_ROAD.to_owned());
+        }
         if self.ended {
             separate_data_sets(&mut rows);
             rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
@@ -564,6 +581,7 @@ impl<'a> Tracks<'a> {
         clock: FrameClock,
     ) -> Result<(), ReadError> {
         let layout = self.source.info().layout;
+        self.source.check_velocities()?;
         plausible::check(beginning, layout, clock)?;
         self.speed_doubt = plausible::doubt(beginning, clock);
         if self.lanes == LaneReliability::Unreliable
@@ -663,7 +681,9 @@ impl<'a> Tracks<'a> {
         let Continuity { vehicles, pieces, .. } = self.continuity();
         let piece_s = self.rows as f64 * self.period.s() / pieces as f64;
         if pieces > SHREDS_PER_VEHICLE * vehicles && piece_s < SHRED_S {
-            return Err(ReadError::of_file(TrajectoryFileProblem::Shreds { vehicles, pieces, piece_s }));
+            let usual = || "frames are missing throughout, or numbers are given to other vehicles".to_owned();
+            let cause = self.lane_doubt.clone().unwrap_or_else(usual);
+            return Err(ReadError::of_file(TrajectoryFileProblem::Shreds { vehicles, pieces, piece_s, cause }));
         }
         Ok(())
     }
@@ -687,7 +707,7 @@ fn is_most(bad: u64, rows: u64) -> bool {
     bad >= LEAST_BAD_ROWS && 2 * bad > rows
 }
 
-/// Returns the error of a file of `rows` rows with `bad` ones, the first of which has the `first` error.
+/// Returns the error of a file of `rows` rows with `bad` ones; the first bad row has the `first` error.
 fn of_most_rows(first: ReadError, bad: u64, rows: u64) -> ReadError {
     let ReadError { line, column, problem } = first;
     ReadError { line, column, problem: TrajectoryFileProblem::MostRows { first: Box::new(problem), bad, rows } }

@@ -274,8 +274,11 @@ fn us_101_in_a_plane_without_names_of_lanes_has_the_lane_changes_of_estimated_la
     }
 }
 
+/// Says whether `laneChange` is 1 in a row of exiD whose vehicle changes lanes or not, and enters a lanelet or not.
+type Flag = fn(changes: bool, enters: bool) -> bool;
+
 /// Writes the rows of tracks as exiD's files, with lanelets of this length (m).
-fn write_exid(folder: &Path, tracks: &[Trajectory], lanelet_m: f64) {
+fn write_exid(folder: &Path, tracks: &[Trajectory], lanelet_m: f64, flag: Flag) {
     let mut text = "recordingId,trackId,frame,xCenter,yCenter,heading,width,length,lonVelocity,lonAcceleration,laneWidth,laneletId,\
                     laneChange\n"
         .to_owned();
@@ -285,13 +288,14 @@ fn write_exid(folder: &Path, tracks: &[Trajectory], lanelet_m: f64) {
         writeln!(meta, "0,{},{},car", track.track_id, rows.len()).unwrap();
         let mut before = None;
         for row in rows {
-            let changes = u8::from(before.is_some_and(|lane| lane != row.lane));
-            before = Some(row.lane);
             let lanelet = 1_000.0 + 10.0 * (row.s_m / lanelet_m).floor() + f64::from(row.lane);
+            let changes = before.is_some_and(|(lane, _)| lane != row.lane);
+            let flag = u8::from(flag(changes, before.is_some_and(|(_, before)| before != lanelet)));
+            before = Some((row.lane, lanelet));
             let frame = (10.0 * row.time.s()).round();
             writeln!(
                 text,
-                "0,{},{frame},{:.3},{:.3},0.0,1.8,4.5,{:.3},0,3.5,{lanelet},{changes}",
+                "0,{},{frame},{:.3},{:.3},0.0,1.8,4.5,{:.3},0,3.5,{lanelet},{flag}",
                 row.vehicle, row.s_m, row.d_m, row.speed_mps
             )
             .unwrap();
@@ -308,8 +312,54 @@ fn us_101_as_exid_has_its_lane_changes_however_short_the_lanelets_are() {
         let Some((data, listed)) = us_101(name) else { return };
         for lanelet_m in [1_000.0, 60.0, 40.0, 30.0] {
             let folder = tempfile::tempdir().unwrap();
-            write_exid(folder.path(), &data.trajectories, lanelet_m);
+            write_exid(folder.path(), &data.trajectories, lanelet_m, |changes, _| changes);
             assert_has(&read(folder.path()).unwrap(), &listed, &format!("{name}, lanelets of {lanelet_m} m"));
         }
+    }
+}
+
+#[test]
+fn lane_changes_that_exid_states_where_no_vehicle_moves_sideways_are_in_doubt() {
+    let Some((data, _)) = us_101("us101_a") else { return };
+    let flags: [(&str, Flag); 3] = [
+        ("all rows", |_, _| true),
+        ("all but the lane changes", |changes, _| !changes),
+        ("new lanelets", |_, enters| enters),
+    ];
+    for (case, flag) in flags {
+        let folder = tempfile::tempdir().unwrap();
+        write_exid(folder.path(), &data.trajectories, 60.0, flag);
+        let data = read(folder.path()).unwrap();
+        let is_told = data.notes.iter().any(|note| note.contains("the vehicle does not move sideways"));
+        assert!(data.is_in_doubt && is_told, "{case}: {:?}", data.notes);
+    }
+}
+
+/// The vehicles of [`off_centre`], and `ramp` others that come from the right along a ramp without lanes of its own.
+fn beside_a_ramp(ramp: u64) -> Vec<Seen> {
+    let mut seen = off_centre();
+    for vehicle in 101..101 + ramp {
+        for step in 0..100_i32 {
+            let s_m = 0.3 * (vehicle % 7) as f64 + 2.0 * f64::from(step);
+            let from_right_m = 0.06 * (150.0 - s_m).max(0.0);
+            let (time, d_m) = (Time::from_ms(100 * i64::from(step)), -1.75 - 7.0 - from_right_m);
+            seen.push(Seen { vehicle, time, s_m, d_m, speed_mps: 20.0, lane: 3 });
+        }
+    }
+    seen
+}
+
+#[test]
+fn a_ramp_that_crosses_the_lanes_of_the_positions_is_in_doubt() {
+    for lanes in [LaneReliability::Reliable, LaneReliability::Unreliable] {
+        let options = ReadOptions { lanes, ..ReadOptions::default() };
+        let read = |ramp: u64| {
+            let text = sumo(&beside_a_ramp(ramp), Course::Straight, |_| String::new()).replace(" lane=\"\"", "");
+            open_from(text.as_bytes(), Path::new("made-up.xml"), options, usize::MAX).unwrap().collect_all().unwrap()
+        };
+        let is_told = |data: &TrajectoryData| data.notes.iter().any(|note| note.contains("ramps or exits lie there"));
+        let (without, with) = (read(0), read(9));
+        assert!(!without.is_in_doubt && !is_told(&without), "{lanes:?}: {:?}", without.notes);
+        assert!(with.is_in_doubt && is_told(&with), "{lanes:?}: {:?}", with.notes);
     }
 }

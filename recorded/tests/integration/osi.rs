@@ -165,6 +165,8 @@ fn a_trace_with_lanes_is_read_with_them() {
         assert!((bus.points[0].d_m + 1.5 * LANE_M).abs() < 1e-9);
         let of_mcap = read("run.mcap", &mcap(&messages, "osi3.GroundTruth"), LaneReliability::Reliable).unwrap();
         assert_eq!(of_mcap.trajectories, of_trace.trajectories);
+        let named_as_trace = read("run.osi", &mcap(&messages, "osi3.GroundTruth"), LaneReliability::Reliable).unwrap();
+        assert_eq!(named_as_trace.trajectories, of_trace.trajectories);
     }
 }
 
@@ -211,6 +213,58 @@ fn vehicles_beside_the_middles_of_the_lanes_and_headings_of_other_axes_are_not_r
 }
 
 #[test]
+fn velocities_in_the_axes_of_the_vehicle_are_refused_by_that_reason() {
+    // The road points to y.
+    let read_with = |velocity: (f64, f64), with_lanes: bool| {
+        let mut messages = messages(with_lanes.then(|| lanes(true)));
+        let turned = |vector: &Vector3d| Vector3d { x: vector.y.map(|y| -y), y: vector.x, ..vector.clone() };
+        for message in &mut messages {
+            for base in message.moving_object.iter_mut().filter_map(|object| object.base.as_mut()) {
+                base.position = base.position.as_ref().map(turned);
+                base.orientation =
+                    Some(Orientation3d { roll: None, pitch: None, yaw: Some(std::f64::consts::FRAC_PI_2) });
+                base.velocity = Some(vector(velocity.0, velocity.1));
+            }
+            for point in message.lane_boundary.iter_mut().flat_map(|line| &mut line.boundary_line) {
+                point.position = point.position.as_ref().map(turned);
+            }
+            for point in message.lane.iter_mut().filter_map(|lane| lane.classification.as_mut()) {
+                point.centerline = point.centerline.iter().map(turned).collect();
+            }
+        }
+        let lanes = if with_lanes { LaneReliability::Reliable } else { LaneReliability::Unreliable };
+        read("run.osi", &trace(&messages), lanes)
+    };
+    for with_lanes in [true, false] {
+        assert_lane_change(&read_with((0.0, 30.0), with_lanes).unwrap());
+        let problem = read_with((30.0, 0.0), with_lanes).unwrap_err().problem;
+        assert!(matches!(problem, TrajectoryFileProblem::VelocitiesAgainstMotion { percent: 99.0.. }), "{problem}");
+    }
+}
+
+#[test]
+fn lost_messages_are_bridged_and_no_uneven_clock() {
+    let kept = messages(Some(lanes(true))).into_iter().enumerate().filter(|(number, _)| number % 50 != 7);
+    let messages: Vec<GroundTruth> = kept.map(|(_, message)| message).collect();
+    let data = read("run.osi", &trace(&messages), LaneReliability::Reliable).unwrap();
+    assert_eq!(detect(&smooth(&data)).len(), 1);
+    assert_eq!((data.continuity.bridged_gaps, data.continuity.pieces), (8 * 24, 24));
+}
+
+#[test]
+fn a_map_that_is_mirrored_with_its_traffic_is_refused() {
+    let mut messages = messages(Some(lanes(true)));
+    let mirror = |vector: &mut Vector3d| vector.y = vector.y.map(|y| -y);
+    for message in &mut messages {
+        let vehicles = message.moving_object.iter_mut().filter_map(|object| object.base.as_mut()?.position.as_mut());
+        let lines = message.lane_boundary.iter_mut().flat_map(|line| &mut line.boundary_line);
+        vehicles.chain(lines.filter_map(|point| point.position.as_mut())).for_each(mirror);
+    }
+    let problem = read("run.osi", &trace(&messages), LaneReliability::Reliable).unwrap_err().problem;
+    assert!(matches!(problem, TrajectoryFileProblem::NeighboursAgainstPosition { contrary: 4, all: 4 }), "{problem}");
+}
+
+#[test]
 fn a_trace_without_lanes_is_read_if_they_are_to_be_estimated() {
     let bytes = trace(&messages(None));
     let error = read("run.osi", &bytes, LaneReliability::Reliable).unwrap_err();
@@ -245,7 +299,13 @@ fn damaged_messages_are_refused_with_their_place() {
     let mut lines = lanes(true);
     lines.1[0].boundary_line =
         vec![BoundaryPoint { position: Some(vector(0.0, 0.0)), width: None, height: None }; 200_001];
+    let mut still = good();
+    still.iter_mut().for_each(|message| message.timestamp = Some(Timestamp { seconds: Some(3), nanos: Some(0) }));
+    let mut pedestrians = good();
+    pedestrians.iter_mut().flat_map(|message| &mut message.moving_object).for_each(|object| object.r#type = Some(3));
     let mcap_bytes = mcap(&good(), "osi3.GroundTruth");
+    let mut flipped = mcap_bytes.clone();
+    flipped[mcap_bytes.len() / 3] ^= 1;
     let mut wrong_magic = mcap_bytes.clone();
     wrong_magic[6] ^= 1;
     let cases: Vec<(&str, &str, Vec<u8>, &str)> = vec![
@@ -258,6 +318,9 @@ fn damaged_messages_are_refused_with_their_place() {
         ("a message without a time", "a.osi", trace(&without_time), "message 1: it has no `timestamp`"),
         ("a time before 1970", "a.osi", trace(&late), "message 1: `timestamp` is -5 s"),
         ("nanoseconds beyond a second", "a.osi", trace(&nanos), "4294967295 ns"),
+        ("a time that stands still", "a.osi", trace(&still), "message 1: `timestamp` is 3 s as in the message before"),
+        ("no vehicle", "a.osi", trace(&pedestrians), "none of its 10000 moving objects has the `type` of a vehicle"),
+        ("a wrong bit", "a.mcap", flipped, "CRC"),
         ("a vehicle twice", "a.osi", trace(&twice), "frame 2 of vehicle 0 stands there twice"),
         ("no number", "a.osi", with(&|object| object.id = None), "message 3, moving_object 2: `id` is missing"),
         (

@@ -694,6 +694,17 @@ fn a_track_of_vissim_ends_where_its_link_ends() {
 }
 
 #[test]
+fn a_gap_on_a_link_of_vissim_splits_a_track_and_hides_its_lane_change() {
+    let time_s = |line: &str| line.split(';').next().unwrap().parse::<f64>().ok();
+    let text = vissim_by_link();
+    let kept = text.lines().filter(|line| time_s(line).is_none_or(|time_s| !(5.5..6.5).contains(&time_s)));
+    let data = read_text((kept.collect::<Vec<_>>().join("\n") + "\n").as_bytes()).unwrap();
+    let continuity = data.continuity;
+    assert_eq!((continuity.vehicles, continuity.pieces, continuity.hidden_crossings), (4, 8, 1));
+    assert!(data.is_in_doubt, "{:?}", data.warnings());
+}
+
+#[test]
 fn malformed_vehicle_records_are_refused() {
     let good = vissim_by_link();
     for (text, needed) in [
