@@ -27,9 +27,9 @@ use crate::support::library;
 
 /// Samples of each scenario: as many as a 99th percentile needs.
 const SAMPLES: u64 = 300;
-/// Samples of each scenario in which a share is judged that is well below one, but not zero: enough
-/// to decide.
-const SHARE_SAMPLES: u64 = 1_200;
+/// Samples of each scenario in which a share is judged that is well below one, but not zero: twice as
+/// many as decide.
+const SHARE_SAMPLES: u64 = 600;
 /// Samples of each scenario with a fault: enough to fail.
 const FAULT_SAMPLES: u64 = 40;
 const SEED: u64 = 1;
@@ -180,13 +180,18 @@ impl EgoController for Faulty {
 
 /// Runs scenarios with the cruise control and with the controller under test, and judges them by
 /// their own checks.
-fn judged(names: &[&str], tested: &Arc<dyn ControllerFactory>, samples: u64) -> (Summary, Judgement) {
+fn judged(
+    names: &[&str],
+    tested: &Arc<dyn ControllerFactory>,
+    samples: u64,
+    checks: CheckPlan,
+) -> (Summary, Judgement) {
     let sampling = Sampling { seed: SEED, design: Design::Random, samples };
     let arm = |controller| Arm { controller, sensors: Some(SensorMode::GroundTruth) };
     let work = |name: &&str| {
         let file = ScenarioFile::load(&library(name), &[]).unwrap();
         let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested.clone())];
-        Arc::new(Work { file, sampling, arms, checks: CheckPlan::default(), retry_crashed: 0 })
+        Arc::new(Work { file, sampling, arms, checks, retry_crashed: 0 })
     };
     let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(10) };
     Campaign::new(names.iter().map(work).collect(), workers).judge(&GateSet::default()).unwrap()
@@ -205,12 +210,12 @@ fn the_mis_passes_the_requirements_of_the_library_but_the_one_that_the_readme_na
         LIBRARY.iter().filter(|name| !is_missed(name)).partition(|name| BRAKING.contains(name));
     let mut headline = None;
     for (names, samples) in [(others, SAMPLES), (braking, SHARE_SAMPLES)] {
-        let (summary, judged) = judged(&names, &BuiltIn::Mis.factory(), samples);
+        let (summary, judged) = judged(&names, &BuiltIn::Mis.factory(), samples, CheckPlan::default());
         assert_eq!(judged.decision, Decision::Pass, "{:#?}", judged.reasons);
         assert!(judged.requirements.iter().all(|requirement| requirement.standing == Standing::Pass));
         headline = summary.scenarios.into_iter().find(|(name, _)| name == "low-thw-overtake").or(headline);
     }
-    let (_, missed) = judged(&[MISSED.0], &BuiltIn::Mis.factory(), SAMPLES);
+    let (_, missed) = judged(&[MISSED.0], &BuiltIn::Mis.factory(), SAMPLES, CheckPlan::default());
     assert_eq!(violated(&missed), [MISSED.1], "{:#?}", missed.reasons);
     let (_, headline) = headline.unwrap();
     assert!(headline.pairs.prevented > headline.pairs.induced);
@@ -224,7 +229,8 @@ fn each_bad_controller_violates_a_requirement_that_is_named() {
     let mut wrong = Vec::new();
     for (fault, requirement) in FAULTS {
         let tested: Arc<dyn ControllerFactory> = Arc::new(fault);
-        let (_, judged) = judged(&LIBRARY, &tested, FAULT_SAMPLES);
+        // Each check takes nine runs, and a failure needs none.
+        let (_, judged) = judged(&LIBRARY, &tested, FAULT_SAMPLES, CheckPlan::off());
         let is_found = match requirement {
             Some(mark) => judged.decision == Decision::Fail && violated(&judged).contains(&mark),
             None => judged.decision == Decision::SampleError,
@@ -238,7 +244,7 @@ fn each_bad_controller_violates_a_requirement_that_is_named() {
 
 #[test]
 fn the_cruise_control_alone_prevents_and_induces_no_collision() {
-    let (summary, judged) = judged(&["low-thw-overtake"], &BuiltIn::Acc.factory(), SAMPLES);
+    let (summary, judged) = judged(&["low-thw-overtake"], &BuiltIn::Acc.factory(), SAMPLES, CheckPlan::default());
     let pairs = summary.total().pairs;
     assert_eq!((pairs.prevented, pairs.induced), (0, 0));
     assert!(pairs.both > 0 && pairs.neither > 0);
