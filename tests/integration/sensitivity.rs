@@ -31,14 +31,15 @@ const FIXED: [&str; 16] = [
 ];
 
 fn study<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    [&["study", "sensitivity", "low-thw-overtake", "--seed", "5", "--format", "json"], &FIXED[..], more].concat()
+    let fixed = ["study", "sensitivity", "low-thw-overtake", "--sensors", "object", "--seed", "5", "--format", "json"];
+    [&fixed[..], &FIXED[..], more].concat()
 }
 
 /// The share of prevented collisions in a campaign with one more setting.
 fn prevented(setting: &str) -> f64 {
-    let fixed =
-        ["campaign", "low-thw-overtake", "-n", "400", "--seed", "6", "--paired", "--no-gate", "--format", "json"];
-    let output = closecall([&fixed[..], &FIXED[..], &["--set", "reaction-s=1.25", "--set", setting]].concat());
+    let fixed = ["campaign", "low-thw-overtake", "-n", "400", "--seed", "6", "--paired", "--no-gate"];
+    let more = ["--sensors", "object", "--format", "json", "--set", "reaction-s=1.25", "--set", setting];
+    let output = closecall([&fixed[..], &FIXED[..], &more].concat());
     json(&output, 0)["paired"]["prevented"].as_f64().unwrap() / 400.0
 }
 
@@ -190,7 +191,8 @@ fn a_frontier_runs_every_combination_on_the_same_samples() {
     let out = folder.path().join("out");
     let mis = "actor.ego.driver.ego-stack.mis";
     let vary = [format!("{mis}.max-deceleration-mps2=1.0,2.0"), format!("{mis}.engage-gap-m=100,150")];
-    let more = ["-n", "60", "--seed", "3", "--format", "json", "--out", out.to_str().unwrap()];
+    let same = ["-n", "60", "--seed", "3", "--sensors", "object", "--format", "json"];
+    let more = [&same[..], &["--out", out.to_str().unwrap()]].concat();
     let frontier = json(
         &closecall(
             [&["study", "frontier", "low-thw-overtake", "--vary", &vary[0], "--vary", &vary[1]], &more[..]].concat(),
@@ -203,8 +205,8 @@ fn a_frontier_runs_every_combination_on_the_same_samples() {
     assert!(points.iter().any(|point| point["optimal"] == true));
     // A campaign with the settings of one combination has its figures.
     let settings = ["--set", &format!("{mis}.max-deceleration-mps2=2.0"), "--set", &format!("{mis}.engage-gap-m=150")];
-    let args = ["campaign", "low-thw-overtake", "-n", "60", "--seed", "3", "--paired", "--no-gate", "--format", "json"];
-    let campaign = json(&closecall([&args[..], &settings].concat()), 0);
+    let args = ["campaign", "low-thw-overtake", "--paired", "--no-gate"];
+    let campaign = json(&closecall([&args[..], &same, &settings].concat()), 0);
     for key in ["prevented", "induced", "prevented_harm", "induced_harm"] {
         assert_eq!(campaign["paired"][key], points[3][key], "{key}");
     }
@@ -219,7 +221,7 @@ fn every_report_of_a_campaign_says_what_moves_its_result_or_that_it_cannot() {
     let out = folder.path().join("out");
     let path = out.to_str().unwrap();
     let args = ["campaign", "low-thw-overtake", "-n", "400", "--seed", "8", "--paired", "--no-gate", "--out", path];
-    let more = ["--record", "failures:0", "--format", "json"];
+    let more = ["--sensors", "object", "--record", "failures:0", "--format", "json"];
     let result = json(&closecall([&args[..], &more].concat()), 0);
     let events = result["influence"]["low-thw-overtake"]["events"].as_array().unwrap();
     let event_named = |name: &str| events.iter().find(|event| event["event"] == name).unwrap();
