@@ -16,9 +16,9 @@ const SEED: &str = "4021";
 fn campaign(parent: &Path, name: &str, samples: u64, arguments: &[&str]) -> PathBuf {
     let path = parent.join(name);
     let (scenario, samples) = (library("low-thw-overtake"), samples.to_string());
-    let base = ["campaign", scenario.to_str().unwrap(), "-n", &samples, "--seed", SEED, "--no-gate", "--out"];
-    let words = base.iter().copied().chain([path.to_str().unwrap()]).chain(arguments.iter().copied());
-    stdout(&closecall(words), 0);
+    let base = ["campaign", scenario.to_str().unwrap(), "-n", &samples, "--seed", SEED, "--sensors", "object"];
+    let place = ["--no-gate", "--out", path.to_str().unwrap()];
+    stdout(&closecall([&base[..], &place, arguments].concat()), 0);
     path
 }
 
@@ -37,13 +37,13 @@ fn number_of_collisions(run: &Value) -> usize {
 #[test]
 fn an_injected_fault_is_named_in_the_failures_that_it_causes() {
     let parent = folder();
-    let usual = failing(&campaign(parent.path(), "usual", 240, &[]));
+    let usual = failing(&campaign(parent.path(), "usual", 400, &[]));
     for (fault, stage) in [
         ("fault.delay-s=0.1", "timing"),
         ("fault.class-background=true", "class"),
         ("fault.rear-reaction-s=1", "rear-reaction"),
     ] {
-        let faulty = campaign(parent.path(), stage, 240, &["--set", fault]);
+        let faulty = campaign(parent.path(), stage, 400, &["--set", fault]);
         let caused: BTreeSet<u64> = failing(&faulty).difference(&usual).copied().collect();
         assert!(caused.len() >= 3, "{fault} causes {} failures only", caused.len());
         let all = closecall(["explain", faulty.to_str().unwrap(), "--most", "1000", "--format", "json"]);
@@ -75,9 +75,9 @@ fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
         let perfect = json(&closecall(["replay", dir, &sample, "--set", &setting, "--format", "json"]), 0);
         assert_eq!(number_of_collisions(&perfect), 0, "sample {sample} with {setting}");
         // A plain run of the scenario with the same seed and settings is the same run.
-        let plain =
-            ["run", "low-thw-overtake", "--seed", SEED, "--sample", &sample, "--set", &setting, "--format", "json"];
-        assert_eq!(number_of_collisions(&json(&closecall(plain), 0)), 0, "sample {sample} with {setting}");
+        let plain = ["run", "low-thw-overtake", "--seed", SEED, "--sample", &sample, "--sensors", "object"];
+        let plain = json(&closecall(plain.into_iter().chain(["--set", &setting, "--format", "json"])), 0);
+        assert_eq!(number_of_collisions(&plain), 0, "sample {sample} with {setting}");
         confirmed += 1;
     }
     assert!(confirmed >= 3, "{confirmed} stages only are confirmed");
@@ -235,7 +235,8 @@ fn the_nearest_failure_of_several_parameters_fails_and_stays_within_its_runs() {
     assert!(text.contains("The nearest failure that a search has found: "), "{text}");
     assert!(all["minimized"]["nearest"]["runs"].as_u64().unwrap() <= 600, "{all:#}");
     // One sample alone is one start.
-    let one = json(&closecall(["minimize", dir, &sample, "--nearest", "--out", name, "--format", "json"]), 0);
+    let one = ["minimize", dir, &sample, "--nearest", "-n", "600", "--out", name, "--format", "json"];
+    let one = json(&closecall(one), 0);
     assert_eq!(one["minimized"]["sample"].to_string(), sample);
     let counts = ["starts", "failing"].map(|key| one["minimized"]["nearest"][key].as_u64().unwrap());
     assert_eq!(counts, [1, 1]);
