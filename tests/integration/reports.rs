@@ -1,26 +1,41 @@
 //! The reports of a campaign: an HTML page, a step summary, JUnit and Parquet.
 
 use std::fs;
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::Command;
+use std::sync::LazyLock;
 
 use closecall_testing::browser;
 
-use crate::support::{folder, library, program, stdout, words_of_gate};
+use crate::support::{folder, library, program, shared_folder, stdout, words_of_gate};
 
-/// Runs a campaign of two scenarios with 480 samples each, with the fast sensors, as the reports do not
-/// depend on them. Returns its standard output.
-fn campaign(out: &Path, more: &[&str], summary: Option<&Path>, expected: i32) -> String {
-    let scenarios = ["low-thw-overtake-at-cut-out", "overtake-without-brake"].map(library);
-    let mut command = program();
-    command.arg("campaign").args(&scenarios);
-    command.args(["-n", "480", "--seed", "1", "--paired", "--sensors", "object"]).args(more).arg("--out").arg(out);
-    match summary {
-        Some(path) => command.env("GITHUB_STEP_SUMMARY", path),
-        None => command.env_remove("GITHUB_STEP_SUMMARY"),
-    };
-    stdout(&command.output().unwrap(), expected)
+/// A campaign of two scenarios with 480 samples each, with the fast sensors, as the reports do not
+/// depend on them.
+struct Reported {
+    out: PathBuf,
+    /// The step summary of the CI server.
+    step: PathBuf,
+    printed: String,
 }
+
+impl Reported {
+    fn new(more: &[&str], expected: i32) -> Self {
+        let folder = shared_folder();
+        let [out, step] = ["out", "step.md"].map(|name| folder.join(name));
+        fs::write(&step, EARLIER).unwrap();
+        let mut command = program();
+        command.arg("campaign").args(["low-thw-overtake-at-cut-out", "overtake-without-brake"].map(library));
+        command.args(["-n", "480", "--seed", "1", "--paired", "--sensors", "object"]).args(more);
+        let output = command.arg("--out").arg(&out).env("GITHUB_STEP_SUMMARY", &step).output().unwrap();
+        Self { out, step, printed: stdout(&output, expected) }
+    }
+}
+
+const EARLIER: &str = "the summary of an earlier step\n";
+
+static PASSED: LazyLock<Reported> = LazyLock::new(|| Reported::new(&["--recordings", "0"], 0));
+static FAILED: LazyLock<Reported> =
+    LazyLock::new(|| Reported::new(&["--recordings", "1", "--gate", "count(ego_collided) <= 0"], 1));
 
 /// Returns the values of an attribute in a page.
 fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
@@ -30,9 +45,7 @@ fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
 
 #[test]
 fn the_page_loads_nothing_and_holds_the_reasons_of_the_verdict() {
-    let folder = folder();
-    let out = folder.path().join("out");
-    let printed = campaign(&out, &["--max-collisions", "0", "--recordings", "1"], None, 1);
+    let Reported { out, printed, .. } = &*FAILED;
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     for loaded in ["<script", "<link", "<iframe", "<img", "@import", "http-equiv"] {
         assert!(!page.contains(loaded), "{loaded}");
@@ -80,8 +93,7 @@ fn the_page_loads_nothing_and_holds_the_reasons_of_the_verdict() {
 fn a_browser_shows_every_element_of_the_page() {
     let Some(browser) = browser() else { return };
     let folder = folder();
-    let out = folder.path().join("out");
-    campaign(&out, &["--recordings", "0"], None, 0);
+    let out = &PASSED.out;
     let address = format!("file://{}", out.join("report.html").display());
     let profile = format!("--user-data-dir={}", folder.path().join("profile").display());
     let shown = Command::new(browser)
@@ -100,14 +112,9 @@ fn a_browser_shows_every_element_of_the_page() {
 
 #[test]
 fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
-    let folder = folder();
-    let out = folder.path().join("out");
-    let summary = folder.path().join("step.md");
-    fs::write(&summary, "the summary of an earlier step\n").unwrap();
-    campaign(&out, &["--recordings", "0"], Some(&summary), 0);
-    let text = fs::read_to_string(&summary).unwrap();
-    let summary = fs::read_to_string(out.join("summary.md")).unwrap();
-    assert_eq!(text, format!("the summary of an earlier step\n{summary}"));
+    let text = fs::read_to_string(&PASSED.step).unwrap();
+    let summary = fs::read_to_string(PASSED.out.join("summary.md")).unwrap();
+    assert_eq!(text, format!("{EARLIER}{summary}"));
     assert!(summary.starts_with("## Closecall: PASS"), "{summary}");
     assert!(
         summary.contains("| low-thw-overtake-at-cut-out | mis | 480 |")
@@ -123,9 +130,7 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
 
 #[test]
 fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
-    let folder = folder();
-    let out = folder.path().join("out");
-    campaign(&out, &["--recordings", "1"], None, 0);
+    let out = &FAILED.out;
     let xml = fs::read_to_string(out.join("samples.xml")).unwrap();
     assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 480);
     assert!(xml.contains("<testsuites name=\"closecall\" tests=\"1920\""));
@@ -143,10 +148,7 @@ fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
 
 #[test]
 fn junit_fails_for_failed_gates_and_for_nothing_else() {
-    let folder = folder();
-    let out = folder.path().join("out");
-    campaign(&out, &["--recordings", "0", "--gate", "count(ego_collided) <= 0"], None, 1);
-    let xml = fs::read_to_string(out.join("junit.xml")).unwrap();
+    let xml = fs::read_to_string(FAILED.out.join("junit.xml")).unwrap();
     // The headline has collisions with the system; the scenario without braking has none.
     assert_eq!(xml.matches("<failure ").count(), 1, "{xml}");
     assert!(xml.contains("low-thw-overtake-at-cut-out: count(ego_collided) &lt;= 0"), "{xml}");
@@ -155,10 +157,7 @@ fn junit_fails_for_failed_gates_and_for_nothing_else() {
 
 #[test]
 fn the_parquet_file_holds_the_units_of_its_columns() {
-    let folder = folder();
-    let out = folder.path().join("out");
-    campaign(&out, &["--recordings", "0"], None, 0);
-    let bytes = fs::read(out.join("outcomes.parquet")).unwrap();
+    let bytes = fs::read(PASSED.out.join("outcomes.parquet")).unwrap();
     let text = String::from_utf8_lossy(&bytes);
     for key in ["unit:param_closing_mps", "closecall:manifest", "unit:min_ttc_rear_s", "unit:max_jerk_mps3"] {
         assert!(text.contains(key), "{key}");

@@ -139,6 +139,12 @@ pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
+/// Creates a folder that several tests share. It stays in the folder of the build: a static value has
+/// no end.
+pub(crate) fn shared_folder() -> PathBuf {
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a temporary folder").keep()
+}
+
 /// Returns the text of the scenario `low-thw-overtake` with the first `from` replaced by `to`.
 pub(crate) fn headline_with(from: &str, to: &str) -> String {
     let text = std::fs::read_to_string(library("low-thw-overtake")).expect("the scenario low-thw-overtake");
