@@ -213,8 +213,8 @@ fn a_window_of_us_101_gives_encounters_of_which_the_system_prevents_some() {
     let folder = folder();
     let out = folder.path().join("chain");
     let recording = data.join("ngsim_us101/trajectories/us101_a.csv");
-    let report =
-        json(&closecall(arguments(&recording, &out, &["-n", "20", "--encounters", "6", "--format", "json"])), 0);
+    let more = ["-n", "20", "--encounters", "6", "--sensors", "object", "--format", "json"];
+    let report = json(&closecall(arguments(&recording, &out, &more)), 0);
     let origins = report["origins"]["encounters"].as_array().unwrap();
     assert!(origins.len() >= 5, "{}", origins.len());
     assert!(sum(&report, "prevented") >= 1, "{report:#}");

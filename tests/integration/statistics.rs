@@ -219,7 +219,7 @@ fn limits_out_of_range_are_wrong_usage() {
 fn comfort_gates_report_the_limit_that_was_exceeded() {
     let path = library("low-thw-overtake-at-cut-out");
     let run = |more: &[&str], expected| {
-        let args = ["campaign", path.to_str().unwrap(), "-n", "80"];
+        let args = ["campaign", path.to_str().unwrap(), "-n", "80", "--sensors", "object"];
         stdout(&closecall(args.iter().chain(more)), expected)
     };
     let jerk = run(&["--max-jerk", "0.5"], 1);
