@@ -76,8 +76,8 @@ impl Drop for Served {
 fn campaign(folder: &TempDir, samples: &str) -> PathBuf {
     let out = folder.path().join("out");
     let mut command = program();
-    command.arg("campaign").arg(library("low-thw-overtake")).args(["-n", samples, "--seed", "1", "--paired", "--out"]);
-    let ran = command.arg(&out).output().unwrap();
+    command.arg("campaign").arg(library("low-thw-overtake")).args(["-n", samples, "--seed", "1", "--paired"]);
+    let ran = command.args(["--sensors", "object", "--out"]).arg(&out).output().unwrap();
     assert!([0, 1, 4].contains(&code(&ran)), "{}", message(&ran));
     out
 }
