@@ -139,7 +139,7 @@ mod tests {
             1 + usize::from(numbers.number(moment(5.0, 12.0, heading_rad)) != first)
         };
         assert_eq!(pieces(20.0, 3.1), 2);
-        assert_eq!(pieces(20.0, 1.5), 1, "a turn in 5 s");
+        assert_eq!(pieces(20.0, 0.1), 1, "a bend");
         assert_eq!(pieces(0.0, 3.1), 1, "the heading of a vehicle that stands may point anywhere");
     }
 
