@@ -123,9 +123,9 @@ fn an_interrupted_campaign_is_resumed_by_the_printed_command_to_the_same_bytes()
     let folder = folder();
     let (whole, out) = (folder.path().join("whole"), folder.path().join("in two parts"));
     let more = ["--seed", "5", "--jobs", "2", "--paired", "--sensors", "object"];
-    let same = args(&whole, None, 1_500, &more);
+    let same = args(&whole, None, 600, &more);
     let whole_output = closecall(&same);
-    let output = interrupted(start(program().args(args(&out, None, 1_500, &more))), &out, Signal::INT);
+    let output = interrupted(start(program().args(args(&out, None, 600, &more))), &out, Signal::INT);
     assert_eq!(code(&output), 130, "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
     let resume = text.lines().find_map(|line| line.strip_prefix("resume: ")).unwrap();
