@@ -1,6 +1,6 @@
 //! Recordings of runs pass the verification of the Rerun viewer.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use closecall_testing::viewer;
@@ -9,15 +9,17 @@ use crate::support::{all_of_library, closecall, code, folder, library, program, 
 
 /// Fails if the viewer does not verify a recording, or if the recording lacks a timeline or an
 /// entity that its blueprint shows.
-fn verify(viewer: &Path, file: &Path) {
-    let size = std::fs::metadata(file).unwrap().len();
-    assert!(size > 10_000 && size < 25_000_000, "{}: {size} bytes", file.display());
-    let verified = Command::new(viewer).args(["rrd", "verify"]).arg(file).output().unwrap();
-    assert!(verified.status.success(), "{}: {}", file.display(), stderr(&verified));
-    let printed = Command::new(viewer).args(["rrd", "print", "-vv"]).arg(file).output().unwrap();
-    let printed = String::from_utf8_lossy(&printed.stdout).into_owned();
-    for named in ["opening", "time", "step", "/verdict", "/summary", "plots/speed/"] {
-        assert!(printed.contains(named), "{}: no `{named}`", file.display());
+fn verify(viewer: &Path, files: &[PathBuf]) {
+    let verified = Command::new(viewer).args(["rrd", "verify"]).args(files).output().unwrap();
+    assert!(verified.status.success(), "{}", stderr(&verified));
+    for file in files {
+        let size = std::fs::metadata(file).unwrap().len();
+        assert!(size > 10_000 && size < 25_000_000, "{}: {size} bytes", file.display());
+        let printed = Command::new(viewer).args(["rrd", "print", "-vv"]).arg(file).output().unwrap();
+        let printed = String::from_utf8_lossy(&printed.stdout).into_owned();
+        for named in ["opening", "time", "step", "/verdict", "/summary", "plots/speed/"] {
+            assert!(printed.contains(named), "{}: no `{named}`", file.display());
+        }
     }
 }
 
@@ -25,11 +27,12 @@ fn verify(viewer: &Path, file: &Path) {
 fn the_recording_of_every_library_scenario_verifies() {
     let Some(viewer) = viewer() else { return };
     let folder = folder();
-    for scenario in all_of_library() {
+    let recorded = all_of_library().into_iter().map(|scenario| {
         let file = folder.path().join(scenario.file_stem().unwrap()).with_extension("rrd");
         stdout(&closecall(["run", scenario.to_str().unwrap(), "--record", file.to_str().unwrap()]), 0);
-        verify(&viewer, &file);
-    }
+        file
+    });
+    verify(&viewer, &recorded.collect::<Vec<_>>());
 }
 
 #[test]
@@ -45,9 +48,7 @@ fn recordings_of_a_pair_a_full_run_and_recorded_traffic_verify() {
     stdout(&closecall(["traffic", "record", headline.to_str().unwrap(), "-n", "2", "-o", &trajectories]), 0);
     stdout(&closecall(["traffic", "criticality", &trajectories, "--record", &traffic]), 0);
     stdout(&closecall(["traffic", "reenact", &trajectories, "--record", &beside]), 0);
-    for file in [pair, full, traffic, beside] {
-        verify(&viewer, Path::new(&file));
-    }
+    verify(&viewer, &[pair, full, traffic, beside].map(PathBuf::from));
     let none = closecall(["traffic", "criticality", &trajectories, "--record", &file("none.rrd"), "--track", "99999"]);
     assert_eq!(code(&none), 2, "{}", stderr(&none));
     assert!(stderr(&none).contains("no lane change of track 99999"), "{}", stderr(&none));
