@@ -11,6 +11,7 @@
 //! on: a test fails when the outcomes change.
 
 pub(crate) mod page;
+mod perception;
 mod printed;
 mod rows;
 pub(crate) mod scenarios;
@@ -30,7 +31,7 @@ pub(crate) struct Args {
     #[arg(short = 'n', long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
     samples: u64,
     /// Number of samples of each member of the driver ensemble, of each scenario with surrounding
-    /// traffic and of each fault
+    /// traffic, of each fault and with two LiDARs
     #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..))]
     member_samples: u64,
     /// Seed of the random numbers
@@ -62,6 +63,9 @@ pub(crate) fn written(section: Section, size: Size, only: &[String]) -> Result<S
         Section::Sensitivity => printed::sensitivity(size),
         Section::Frontier => printed::frontier(size),
         Section::Anchor => printed::anchor(size),
+        Section::Conditions => perception::conditions(size),
+        Section::Lidars => perception::lidars(size),
+        Section::TwoLidars => perception::two_lidars(size),
     }?;
     Ok(format!("{}\n{table}", page::provenance(section, size)?))
 }

@@ -50,6 +50,12 @@ pub(crate) enum Section {
     Frontier,
     /// Emergency braking against crash records
     Anchor,
+    /// What the rear sensors see in each condition
+    Conditions,
+    /// What other rear LiDARs see
+    Lidars,
+    /// What two rear LiDARs see, and what a fault of one costs
+    TwoLidars,
 }
 
 /// The file of the outcomes' digests, below the folder of the repository.
@@ -58,7 +64,7 @@ const DIGESTS: &str = "docs/evidence/determinism.json";
 const DIGITS: usize = 12;
 
 impl Section {
-    pub(crate) const ALL: [Self; 15] = [
+    pub(crate) const ALL: [Self; 18] = [
         Self::Scenarios,
         Self::Traffic,
         Self::OtherFunctions,
@@ -74,6 +80,9 @@ impl Section {
         Self::Sensitivity,
         Self::Frontier,
         Self::Anchor,
+        Self::Conditions,
+        Self::Lidars,
+        Self::TwoLidars,
     ];
 
     /// Returns the page, below the folder of the repository.
@@ -82,6 +91,7 @@ impl Section {
             Self::Faults => "docs/evidence/faults.md",
             Self::Sensitivity | Self::Frontier => "docs/evidence/sensitivity.md",
             Self::Anchor => "docs/evidence/anchor.md",
+            Self::Conditions | Self::Lidars | Self::TwoLidars => "docs/evidence/perception.md",
             _ => "docs/evidence/mis.md",
         }
     }
@@ -95,6 +105,7 @@ impl Section {
             Self::OtherFunctions => super::scenarios::have_as_other_function(scenario),
             Self::Agreement | Self::Ensemble => super::scenarios::have(scenario),
             Self::Arms | Self::Promise | Self::Distributions | Self::Slowing | Self::Sensitivity => is_headline,
+            Self::Conditions | Self::Lidars | Self::TwoLidars => is_headline,
             Self::Twins => super::rows::TWINS.contains(&scenario),
             Self::EventFree => super::rows::rests_without_event_on(scenario),
             Self::Faults => is_headline || scenario.starts_with("faults/"),
@@ -110,7 +121,17 @@ impl Section {
 
     /// Returns true if the figures rest on no runs with object-level sensors.
     const fn is_full_alone(self) -> bool {
-        matches!(self, Self::Scenarios | Self::Traffic | Self::OtherFunctions | Self::Promise | Self::Twins)
+        matches!(
+            self,
+            Self::Scenarios
+                | Self::Traffic
+                | Self::OtherFunctions
+                | Self::Promise
+                | Self::Twins
+                | Self::Conditions
+                | Self::Lidars
+                | Self::TwoLidars
+        )
     }
 
     /// Returns the name on the command line.

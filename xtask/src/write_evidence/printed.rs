@@ -5,15 +5,25 @@ use std::process::Command;
 
 use super::page::{self, Size};
 
-/// Returns a command and its output, as blocks of Markdown. The program is in the folder of this
-/// program.
-fn printed(words: &[&str]) -> Result<String, Box<dyn Error>> {
+/// Returns the output of a command. The program is in the folder of this program.
+fn output(words: &[&str]) -> Result<Vec<u8>, Box<dyn Error>> {
     let program = std::env::current_exe()?.with_file_name("closecall");
     let output = Command::new(program).args(words).current_dir(page::root()).env("COLUMNS", "120").output()?;
     if !output.status.success() {
         return Err(format!("{}: {}", words.join(" "), String::from_utf8_lossy(&output.stderr)).into());
     }
-    let text = String::from_utf8_lossy(&output.stdout);
+    Ok(output.stdout)
+}
+
+/// Returns the figures that a command prints for programs.
+pub(super) fn json(words: &[&str]) -> Result<serde_json::Value, Box<dyn Error>> {
+    Ok(serde_json::from_slice(&output(&[words, &["--format", "json"]].concat())?)?)
+}
+
+/// Returns a command and its output, as blocks of Markdown.
+fn printed(words: &[&str]) -> Result<String, Box<dyn Error>> {
+    let text = output(words)?;
+    let text = String::from_utf8_lossy(&text);
     Ok(format!("`closecall {}` prints:\n\n```\n{}\n```\n", words.join(" "), text.trim_end()))
 }
 
