@@ -98,9 +98,9 @@ pub enum BaselineError {
     Different {
         /// What differs.
         subject: String,
-        /// Its value in the baseline.
+        /// The value in the baseline.
         baseline: String,
-        /// Its value in the campaign.
+        /// The value in the campaign.
         current: String,
     },
 }
