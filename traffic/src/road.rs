@@ -217,7 +217,7 @@ impl Check for RoadConfig {
 
 impl Road {
     /// Widths of a lane that the models cover (m).
-    pub const LANE_WIDTH_M: Range = Range::closed(2.5, 5.0);
+    pub const LANE_WIDTH_M: Range = widths::WIDTH_M;
     /// Curvatures of a road of one curvature that the models cover (1/m): 400 m is the smallest
     /// radius at which the small-angle lane geometry still holds. An alignment has
     /// [`Alignment::CURVATURE_PER_M`].
@@ -360,12 +360,12 @@ impl Road {
 
     /// Returns the width of a lane (m). An acceleration lane has it where it does not narrow.
     pub fn lane_width_m(&self, lane: Lane) -> f64 {
-        self.widths.width_m(lane)
+        self.widths.width_m(lane.0)
     }
 
     /// Returns the widths of the lanes (m), from lane 1 on.
     pub fn lane_widths_m(&self) -> impl Iterator<Item = f64> {
-        (1..=self.lanes).map(|lane| self.widths.width_m(Lane(lane)))
+        (1..=self.lanes).map(|lane| self.widths.width_m(lane))
     }
 
     /// Returns the width of every lane (m), or `None` if the lanes have different widths.
@@ -533,13 +533,13 @@ impl Road {
 
     /// Returns the lateral position of the centre of a lane (m), which is negative.
     pub fn lane_centre_m(&self, lane: Lane) -> f64 {
-        self.widths.centre_m(lane)
+        self.widths.centre_m(lane.0)
     }
 
     /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that
     /// edge.
     pub fn lane_at(&self, d_m: f64) -> Lane {
-        self.widths.lane_at(self.lanes, d_m)
+        Lane(self.widths.lane_at(self.lanes, d_m))
     }
 
     /// Returns the lane next to `lane` on one side, or `None` if the road has none there.

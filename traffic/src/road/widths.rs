@@ -10,11 +10,12 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{self, IntoDeserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::{Lane, Road};
-use crate::{ConfigError, KeyPath, Num, Parameters, Problem, Segment};
+use crate::{ConfigError, KeyPath, Num, Parameters, Problem, Range, Segment};
 
 /// Largest number of lanes.
 pub(super) const MOST_LANES: usize = 8;
+/// Widths of a lane that the models cover (m).
+pub(super) const WIDTH_M: Range = Range::closed(2.5, 5.0);
 /// The key in a scenario file.
 const KEY: &str = "lane-width-m";
 
@@ -79,8 +80,8 @@ impl JsonSchema for LaneWidthsConfig {
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let equal = generator.subschema_for::<Num>();
         let mut each = generator.subschema_for::<Num>();
-        each.insert("minimum".to_owned(), Road::LANE_WIDTH_M.low().into());
-        each.insert("maximum".to_owned(), Road::LANE_WIDTH_M.high().into());
+        each.insert("minimum".to_owned(), WIDTH_M.low().into());
+        each.insert("maximum".to_owned(), WIDTH_M.high().into());
         json_schema!({ "anyOf": [equal, { "type": "array", "items": each, "minItems": 1, "maxItems": MOST_LANES }] })
     }
 }
@@ -89,7 +90,7 @@ impl LaneWidthsConfig {
     /// Checks the widths on a road with this number of lanes.
     pub(super) fn check(&self, lanes: u8, parameters: &Parameters) -> Result<LaneWidths, ConfigError> {
         let widths = match self {
-            Self::Equal(num) => return parameters.number(num, KEY, Road::LANE_WIDTH_M).map(LaneWidths::Equal),
+            Self::Equal(num) => return parameters.number(num, KEY, WIDTH_M).map(LaneWidths::Equal),
             Self::Each(widths) => widths,
         };
         if widths.len() != usize::from(lanes) {
@@ -103,7 +104,7 @@ impl LaneWidthsConfig {
         let mut widths_m = Vec::new();
         for (index, num) in widths.iter().enumerate() {
             let path = KeyPath(vec![Segment::Key(KEY.to_owned()), Segment::Index(index)]);
-            let width_m = parameters.number(num, KEY, Road::LANE_WIDTH_M);
+            let width_m = parameters.number(num, KEY, WIDTH_M);
             widths_m.push(width_m.map_err(|error| ConfigError { path, ..error })?);
         }
         Ok(LaneWidths::new(&widths_m))
@@ -138,10 +139,10 @@ impl LaneWidths {
     }
 
     /// Returns the width of a lane (m).
-    pub(super) fn width_m(&self, lane: Lane) -> f64 {
+    pub(super) fn width_m(&self, lane: u8) -> f64 {
         match self {
             Self::Equal(width_m) => *width_m,
-            Self::Each(each_m) => each_m.get(usize::from(lane.0).wrapping_sub(1)).copied().unwrap_or_default(),
+            Self::Each(each_m) => each_m.get(usize::from(lane).wrapping_sub(1)).copied().unwrap_or_default(),
         }
     }
 
@@ -155,16 +156,16 @@ impl LaneWidths {
     }
 
     /// Returns the lateral position of the centre of a lane (m).
-    pub(super) fn centre_m(&self, lane: Lane) -> f64 {
+    pub(super) fn centre_m(&self, lane: u8) -> f64 {
         match self {
-            Self::Equal(width_m) => -(f64::from(lane.0) - 0.5) * width_m,
-            Self::Each(_) => self.boundary_m(lane.0) + 0.5 * self.width_m(lane),
+            Self::Equal(width_m) => -(f64::from(lane) - 0.5) * width_m,
+            Self::Each(_) => self.boundary_m(lane) + 0.5 * self.width_m(lane),
         }
     }
 
     /// Returns the lane of a road of `lanes` lanes in which a lateral position lies; beyond an edge,
     /// the lane at that edge.
-    pub(super) fn lane_at(&self, lanes: u8, d_m: f64) -> Lane {
+    pub(super) fn lane_at(&self, lanes: u8, d_m: f64) -> u8 {
         match self {
             Self::Equal(width_m) => {
                 #[expect(
@@ -173,11 +174,11 @@ impl LaneWidths {
                     reason = "clamped to 0..=7 before the cast"
                 )]
                 let before = (-d_m / width_m).clamp(0.0, f64::from(lanes) - 1.0) as u8;
-                Lane(before + 1)
+                before + 1
             }
             Self::Each(_) => {
                 let passes = |number: &u8| d_m <= self.boundary_m(*number);
-                Lane((1..lanes).take_while(passes).last().unwrap_or_default() + 1)
+                (1..lanes).take_while(passes).last().unwrap_or_default() + 1
             }
         }
     }
@@ -209,7 +210,7 @@ impl LaneWidths {
 mod tests {
     use super::super::RoadConfig;
     use super::*;
-    use crate::{Check, Side};
+    use crate::{Check, Lane, Road, Side};
 
     const WIDTHS_M: [f64; 3] = [3.25, 3.5, 3.75];
 
