@@ -57,8 +57,8 @@ fn a_vehicle_overtakes_on_the_centre_of_a_wider_lane_and_is_recorded() {
     assert!(rear.iter().all(|(_, _, d_m)| *d_m < PASSING_CENTRE_M + 1e-6));
 }
 
-/// The steps in which the sensors see the rear vehicle, and the steps in which its track is in its lane:
-/// in the passing lane, and in the lane of the ego.
+/// The steps in which the sensors see the rear vehicle, and the steps in which its track is in its
+/// lane: in the passing lane, and in the lane of the ego.
 #[derive(Default)]
 struct SeenInLane {
     steps: [usize; 2],
@@ -90,12 +90,16 @@ impl Observer for SeenInLane {
 
 #[test]
 fn the_sensors_see_a_vehicle_in_its_lane() {
-    let file = ScenarioFile::load(&library("paper-figure"), &[WIDTHS.parse().unwrap()]).unwrap();
-    let scenario = file.concrete(&file.space().nominal()).unwrap();
     for sensors in [SensorMode::Full, SensorMode::Object] {
         let mut seen = SeenInLane::default();
-        let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(sensors) };
-        simulate(&scenario, RunKey { seed: 0, sample: 0 }, &arm, &mut seen).unwrap();
+        for lane in 1..=2 {
+            let settings = [WIDTHS.to_owned(), format!("actor.rear.start.behind.lane={lane}")];
+            let settings = settings.map(|setting| setting.parse().unwrap());
+            let file = ScenarioFile::load(&library("paper-figure"), &settings).unwrap();
+            let scenario = file.concrete(&file.space().nominal()).unwrap();
+            let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(sensors) };
+            simulate(&scenario, RunKey { seed: 0, sample: 0 }, &arm, &mut seen).unwrap();
+        }
         for (steps, right) in seen.steps.into_iter().zip(seen.right) {
             assert!(steps > 20 && 20 * right >= 19 * steps, "{right} of {steps} steps in {sensors:?}");
         }
