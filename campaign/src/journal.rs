@@ -205,7 +205,7 @@ pub(crate) fn copies<K: Ord + Copy>(path: &Path, order: impl Fn(&Record) -> Opti
             lines.push(IntactLine { number, sum, place });
         }
     }
-    // Equal lines directly behind each other form a group, of which at most one line stays.
+    // Equal lines directly behind each other form a group, and at most one line of it stays.
     let groups: Vec<_> = lines.chunk_by(|line, next| line.sum == next.sum).collect();
     let mut kept = HashSet::new();
     for (index, group) in groups.iter().enumerate() {

@@ -20,8 +20,8 @@
  *
  * Times are in s, lengths in m, speeds in m/s, accelerations in m/s^2, angles in rad. x points ahead of the ego, y to its left.
  *
- * CLOSECALL_CONTROLLER_ABI is the version of the interface. Any change of the interface changes it, and Closecall refuses a library of a
- * number that it does not know. */
+ * CLOSECALL_CONTROLLER_ABI is the version of the interface. A structure may grow at its end; any other change changes it, and
+ * Closecall refuses a library of a number that it does not know. */
 #ifndef CLOSECALL_CONTROLLER_H
 #define CLOSECALL_CONTROLLER_H
 

@@ -21,8 +21,8 @@
  * Times are in s or ns, lengths in m, speeds in m/s, angles in rad. The frame of the ego has its origin in the middle of the ego on
  * the ground: x points ahead, y to its left, z up. docs/reference/perception.md explains every value.
  *
- * CLOSECALL_PERCEPTION_ABI is the version of the interface. Any change of the interface changes it, and Closecall refuses a library of a
- * number that it does not know. */
+ * CLOSECALL_PERCEPTION_ABI is the version of the interface. A structure may grow at its end; any other change changes it, and
+ * Closecall refuses a library of a number that it does not know. */
 #ifndef CLOSECALL_PERCEPTION_H
 #define CLOSECALL_PERCEPTION_H
 

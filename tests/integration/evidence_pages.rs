@@ -52,6 +52,28 @@ fn no_section_is_older_than_the_outcomes_that_it_shows() {
 }
 
 #[test]
+fn every_measurement_names_its_commit_date_machine_and_command() {
+    let pages = std::fs::read_dir(PathBuf::from(ROOT).join("docs/evidence")).unwrap();
+    let pages = pages.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|end| end == "md"));
+    let mut measurements = 0;
+    for page in pages {
+        let text = std::fs::read_to_string(&page).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for (index, _) in lines.iter().enumerate().filter(|(_, line)| line.starts_with("| commit | date |")) {
+            let row = lines[index + 2];
+            let cells: Vec<&str> = row.trim_matches('|').split(" | ").map(str::trim).collect();
+            let is_hash = |word: &str| word.len() >= 6 && word.chars().all(|c| c.is_ascii_hexdigit());
+            let has_commit = cells[0].split([' ', ',', ';']).any(is_hash);
+            let names_all = has_commit && cells[1].starts_with("20") && cells.iter().all(|cell| !cell.is_empty());
+            assert!(cells.len() >= 4 && names_all, "{}: {row}", page.display());
+            measurements += 1;
+        }
+        assert!(!text.contains("not recorded"), "{}", page.display());
+    }
+    assert!(measurements > 40, "{measurements}");
+}
+
+#[test]
 fn the_committed_sections_have_the_form_that_the_program_writes() {
     let size = Size { samples: 3, member_samples: 2, seed: 1001 };
     for section in [Section::Arms, Section::Slowing] {

@@ -31,7 +31,7 @@ struct Crossing {
     to: u8,
 }
 
-/// The vehicles in parts of the road, each of which is two sections long and begins with a section.
+/// The vehicles in parts of the road. Each part is two sections long and begins with a section.
 #[derive(Debug, Default)]
 struct Parts {
     in_lane: BTreeMap<(i64, u8), BTreeSet<u64>>,
