@@ -32,6 +32,10 @@ const LINES: [(&str, f64, f64); 4] = [
     ("reflectivity 0.5, window transmits 0.5", 0.5, 0.5),
     ("reflectivity 0.1", 0.1, 1.0),
 ];
+/// Colours of the lines, then of the marks, by their places in the palette: none is too light on white.
+const COLOURS: [usize; 6] = [0, 1, 12, 3, 4, 5];
+/// Size of the labels (px).
+const LABEL_PX: u32 = 15;
 /// Range (m) and published echo pulse width (m) of the boards.
 const MEASURED: [(f64, f64); 3] = [(19.865, 1.829), (14.995, 1.989), (9.984, 2.029)];
 
@@ -40,13 +44,15 @@ pub(crate) fn main(words: Vec<String>) -> Result<(), Box<dyn Error>> {
 }
 
 fn draw(chart: &mut Plane<'_>) -> Result<(), Box<dyn Error>> {
-    chart.configure_mesh().light_line_style(WHITE).x_desc("range [m]").y_desc("echo pulse width [ns]").draw()?;
+    let font = ("sans-serif", LABEL_PX);
+    let mut mesh = chart.configure_mesh();
+    mesh.light_line_style(WHITE).label_style(font).x_desc("range [m]").y_desc("echo pulse width [ns]").draw()?;
     for (index, (name, reflectivity, window_transmission)) in LINES.into_iter().enumerate() {
         let config = LidarConfig { window_transmission: Num::Fixed(window_transmission), ..LidarConfig::default() };
         let lidar = config.check(&Parameters::default())?;
         let point = |range_m: f64| (range_m, echo_pulse_width_ns(&lidar, reflectivity, range_m));
         let points = steps((NEAREST_M, RANGE_M.1), STEP_M).map(point).filter(|(_, width_ns)| *width_ns > 0.0);
-        let line = Palette99::pick(index).stroke_width(2);
+        let line = Palette99::pick(COLOURS[index]).stroke_width(2);
         chart
             .draw_series(LineSeries::new(points, line))?
             .label(name)
@@ -54,7 +60,7 @@ fn draw(chart: &mut Plane<'_>) -> Result<(), Box<dyn Error>> {
     }
     let readings = [("LUX 2010, if light passes the length twice", 2.0), ("LUX 2010, if light passes it once", 1.0)];
     for (index, (name, passes)) in readings.into_iter().enumerate() {
-        let mark = Palette99::pick(LINES.len() + index).filled();
+        let mark = Palette99::pick(COLOURS[LINES.len() + index]).filled();
         let points = MEASURED.map(|(range_m, length_m)| (range_m, passes * length_m / M_PER_NS));
         chart
             .draw_series(points.into_iter().map(|point| Circle::new(point, 4, mark)))?
