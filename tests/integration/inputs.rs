@@ -150,7 +150,7 @@ fn the_path_of_onnx_runtime_matters_only_if_the_network_runs() {
     let campaign = ["campaign", scenario, "--sensors", "full", "--no-out"];
     for needed in [&["run", scenario, "--sensors", "full"], &campaign[..]] {
         let output = with_bad_path(needed);
-        assert_eq!(code(&output), 3, "{}", stderr(&output));
+        assert_eq!(code(&output), 6, "{}", stderr(&output));
         assert!(message(&output).contains("/no/such/library.so"), "{}", stderr(&output));
     }
 }

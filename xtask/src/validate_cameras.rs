@@ -111,13 +111,15 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 fn print_row(name: &str, runs: &[Run]) {
     let count = |holds: fn(&Run) -> bool| runs.iter().filter(|run| holds(run)).count();
     let total = |value: fn(&Run) -> f64| runs.iter().map(value).sum::<f64>();
-    let classified = count(|run| run.classified_m.is_some());
+    let classified_m: Vec<f64> = runs.iter().filter_map(|run| run.classified_m).collect();
+    let mean_m =
+        if classified_m.is_empty() { "-".to_owned() } else { format!("{:.1}", mean(classified_m.iter().copied())) };
     println!(
-        "  {name}: {} collisions, engaged in {}, classified in {classified} at {:.1} m on average, {:.2} s of processor time per sample, \
+        "  {name}: {} collisions, engaged in {}, classified in {} at {mean_m} m on average, {:.2} s of processor time per sample, \
          {:.0} simulated seconds per second",
         count(|run| run.verdict.has_collided),
         count(|run| run.verdict.engaged_at_s.is_some()),
-        mean(runs.iter().filter_map(|run| run.classified_m)),
+        classified_m.len(),
         total(|run| run.processor_s) / runs.len() as f64,
         total(|run| run.simulated_s) / total(|run| run.processor_s),
     );

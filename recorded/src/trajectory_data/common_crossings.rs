@@ -116,7 +116,7 @@ mod tests {
     /// ones come from the right, across the lanes 4 and 3, to lane 2.
     fn rows(ramp: u64) -> Vec<Row> {
         let lane = |vehicle: u64, s_m: f64| {
-            let first = u8::from(vehicle % 2 == 0) + 1;
+            let first = u8::from(vehicle.is_multiple_of(2)) + 1;
             let is_over = vehicle % 4 < 2 && s_m > 60.0 + 12.0 * vehicle as f64;
             match vehicle {
                 0..40 if is_over => 3 - first,
