@@ -253,7 +253,8 @@ Finds cars, trucks and motorcycles in the image of the rear camera: boxes, class
 - **Judged on** {len(truth["images"])} held-out images with {len(truth["annotations"])} vehicles: body shapes, paints and seeds that training never saw.
   The tables are for one seed, {truth["info"]["seed"]}; `docs/evidence/mask-rcnn.md` has four further seeds.
 - **Misses** {100 * share_missed:.1f} % of the vehicles from 20 px on at a score of 0.5, in all lights and weathers.
-- **Has never seen**: a photograph; a lens with distortion, a rolling shutter; gantries, signs and trees; buses other than coaches, trailers behind cars,
+- **Has never seen**: a photograph; a lens with distortion, a rolling shutter; signs and trees; the gantries that a scenario file
+  places (`road.roadside`; the training pictures have gantries of another form); buses other than coaches, trailers behind cars,
   bicycles, pedestrians; snow, tunnels. What it says of photographs is not known.
 - **Not for** anything but simulation.
 
