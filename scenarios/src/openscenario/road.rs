@@ -180,6 +180,22 @@ fn driving_lanes(
     Ok(driving)
 }
 
+/// Returns a note on the lanes of a section that a scenario has no place for: lanes beside the
+/// driving lanes of `side`, such as a shoulder, and oncoming lanes.
+fn left_out(section: &Node, side: &str) -> Option<String> {
+    let kinds = |side: &str| -> BTreeSet<String> {
+        let lanes = section.child(side).into_iter().flat_map(|lanes| lanes.all("lane"));
+        lanes.filter_map(|lane| lane.raw("type")).map(str::to_owned).collect()
+    };
+    let is_driving = |kind: &str| DRIVING.contains(&kind);
+    let beside = kinds(side).into_iter().filter(|kind| !is_driving(kind) && kind != "none");
+    let mut left_out: Vec<String> = beside.map(|kind| format!("`{kind}`")).collect();
+    if kinds(if side == "left" { "right" } else { "left" }).iter().any(|kind| is_driving(kind)) {
+        left_out.push("oncoming ones".to_owned());
+    }
+    (!left_out.is_empty()).then(|| format!("lanes that a scenario does not have: {}", left_out.join(", ")))
+}
+
 /// Returns the driving lane that the scenario uses. `along` holds the lanes of one side.
 fn used_lane(
     path: &Path,
@@ -251,6 +267,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         let message = format!("it has {} driving lanes; a scenario has 1 to 8", driving.len());
         return Err(along.error(path, message));
     }
+    notes.extend(left_out(section, side));
     if along.all("lane").any(changes_width) {
         notes.push(format!("lanes whose width changes: each has the width at {s_m} m"));
     }
@@ -526,7 +543,7 @@ mod tests {
         let right = road_with([3.25, 4.0], "RHT", "right", "-").unwrap();
         assert_eq!(
             (&right.widths_m[..], &right.centres_m[..], right.notes.len()),
-            (&[3.25, 4.0][..], &[-2.625, -6.25][..], 0)
+            (&[3.25, 4.0][..], &[-2.625, -6.25][..], 1)
         );
         assert_eq!([0, 1].map(|index| right.centre_m(index)), [-1.625, -5.25]);
         assert_eq!(right.alignment_d_m, 1.0);
@@ -545,7 +562,7 @@ mod tests {
         assert_eq!(wide.widths_m, [3.5, 3.5]);
         let note = "lane -3 with a width of 6 m at 0 m, and a lane of a scenario has a width of 2.5 to 5 m: \
                     it has the 3.5 m of the ego's lane";
-        assert_eq!(wide.notes, [note]);
+        assert_eq!(wide.notes, ["lanes that a scenario does not have: `median`", note]);
     }
 
     #[test]
@@ -558,7 +575,13 @@ mod tests {
             lanes.concat()
         );
         let road = read(Path::new("road.xodr"), &text, &UsedRoad::Only).unwrap();
-        assert_eq!(road.notes, ["3.00 m between its lanes -1 and -3: they lie beside each other here"]);
+        assert_eq!(
+            road.notes,
+            [
+                "lanes that a scenario does not have: `biking`",
+                "3.00 m between its lanes -1 and -3: they lie beside each other here"
+            ]
+        );
     }
 
     #[test]
