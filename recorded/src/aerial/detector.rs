@@ -13,7 +13,7 @@ use crate::aerial::image_box::ImageBox;
 use crate::aerial::overlap::intersection_over_union;
 
 /// The ONNX file of the network that ships with Closecall.
-pub const SHIPPED_DETECTOR: &[u8] = include_bytes!("../../models/aerial-detector.onnx");
+pub static SHIPPED_DETECTOR: &[u8] = include_bytes!("../../models/aerial-detector.onnx");
 
 /// Pixels of a cell of the output, along each axis.
 pub(crate) const STRIDE: usize = 8;

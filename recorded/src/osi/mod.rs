@@ -9,4 +9,4 @@ mod messages;
 pub use messages::*;
 
 /// The compiled `osi3.proto`, for a reader without a definition of its own.
-pub const DESCRIPTORS: &[u8] = include_bytes!("osi3.desc");
+pub static DESCRIPTORS: &[u8] = include_bytes!("osi3.desc");

@@ -23,7 +23,7 @@ use super::image::{CHANNELS, CROP_PX, Crop};
 use super::vector_registers::clear_upper_parts;
 
 /// The ONNX file of the network that ships with Closecall.
-pub const SHIPPED_MODEL: &[u8] = include_bytes!("../../models/rear-classifier.onnx");
+pub static SHIPPED_MODEL: &[u8] = include_bytes!("../../models/rear-classifier.onnx");
 
 /// Number of samples in a crop.
 const SAMPLES: usize = CROP_PX * CROP_PX;
@@ -185,7 +185,9 @@ impl Classifier {
         })?;
         let mut classifier = Self { name: path.to_owned(), ..classifier };
         classifier.classify(&Crop::default()).map_err(|error| match error {
-            ClassifierError::Run { reason } => at(reason),
+            ClassifierError::Run { reason } => at(format!(
+                "{reason}; it must take float [1, {CHANNELS}, {CROP_PX}, {CROP_PX}] and answer float [1, 4]"
+            )),
             other => other,
         })?;
         Ok(classifier)
@@ -220,7 +222,13 @@ impl Classifier {
 fn scores_from(output: &[f32]) -> Result<ClassScores, Vec<String>> {
     /// Four probabilities in single precision sum to 1 within this tolerance.
     const TOLERANCE: f64 = 1e-4;
-    let invalid_output = || output.iter().map(f32::to_string).collect::<Vec<_>>();
+    /// Number of values that a message shows.
+    const SHOWN: usize = 8;
+    let invalid_output = || {
+        let shown = output.iter().take(SHOWN).map(f32::to_string);
+        let rest = (output.len() > SHOWN).then(|| format!("… {} values", output.len()));
+        shown.chain(rest).collect::<Vec<_>>()
+    };
     let probabilities: [f32; 4] = output.try_into().map_err(|_| invalid_output())?;
     let probabilities = probabilities.map(f64::from);
     let sum: f64 = probabilities.iter().sum();

@@ -36,7 +36,7 @@ use super::vector_registers::clear_upper_parts;
 
 /// The ONNX file of the Mask R-CNN that ships with Closecall. `xtask/training/mask_rcnn_train.py`
 /// trained it, and `models/MASK_RCNN_CARD.md` reports its precision.
-pub const SHIPPED_MASK_RCNN: &[u8] = include_bytes!("../../models/rear-mask-rcnn.onnx");
+pub static SHIPPED_MASK_RCNN: &[u8] = include_bytes!("../../models/rear-mask-rcnn.onnx");
 
 /// The layout that a network must have.
 const WANTED: &str = "an input float [3, 800, 1280] or [1, 3, 800, 1280] (sides may be dynamic), and the outputs boxes float \
