@@ -15,12 +15,14 @@ mod schema;
 #[path = "../../../xtask/src/write_references/text.rs"]
 mod text;
 
-use files::{ANNOTATED, EVERY_KEY, PAGE, at_root};
+use files::{EVERY_KEY, PAGE, at_root};
 use page::{SENSOR_DEFAULTS, scenario_page, title};
 use probe::Probe;
 use schema::{Kind, Step, tables};
 use text::default_in;
 
+/// The example that the page links.
+const ANNOTATED: &str = "docs/reference/scenario/annotated.toml";
 /// The object-level sensors, in the order of [`SENSOR_DEFAULTS`].
 const SENSORS: [&str; 3] = ["front-radar", "surround", "rear-object"];
 

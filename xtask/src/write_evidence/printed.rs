@@ -27,9 +27,24 @@ fn printed(words: &[&str]) -> Result<String, Box<dyn Error>> {
     Ok(format!("`closecall {}` prints:\n\n```\n{}\n```\n", words.join(" "), text.trim_end()))
 }
 
+/// The outputs of the study that the page leaves out.
+const OTHER_OUTPUTS: [&str; 4] =
+    ["induced collisions", "harm prevented", "collisions in the baseline", "collisions in the arm under test"];
+
 /// The factors that move the number of prevented collisions.
 pub(super) fn sensitivity(size: Size) -> Result<String, Box<dyn Error>> {
-    printed(&["study", "sensitivity", "low-thw-overtake", "--seed", &size.seed.to_string(), "--sensors", "object"])
+    let seed = size.seed.to_string();
+    let text = printed(&["study", "sensitivity", "low-thw-overtake", "--seed", &seed, "--sensors", "object"])?;
+    let mut is_other = false;
+    let is_kept = |paragraph: &&str| {
+        // A table that is indented belongs to the output above it.
+        if !paragraph.starts_with(' ') {
+            is_other = OTHER_OUTPUTS.iter().any(|output| paragraph.starts_with(output));
+        }
+        !is_other
+    };
+    let kept: Vec<&str> = text.split("\n\n").filter(is_kept).collect();
+    Ok(kept.join("\n\n").replacen(" prints:", " prints, without its other outputs:", 1))
 }
 
 /// What settings of the system prevent, induce and cost.

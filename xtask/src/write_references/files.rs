@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 /// The page that is written.
 pub(crate) const PAGE: &str = "docs/reference/scenario.md";
-/// The example at the top of the page.
-pub(crate) const ANNOTATED: &str = "docs/reference/scenario/annotated.toml";
 /// The scenario that uses every key.
 pub(crate) const EVERY_KEY: &str = "docs/reference/scenario/every-key.toml";
 

@@ -6,7 +6,6 @@ use std::fmt::Write;
 use closecall::scenarios::ScenarioConfig;
 use serde_json::Value;
 
-use super::files::{ANNOTATED, at_root};
 use super::probe::Probe;
 use super::schema::{Key, Kind, Step, Table, Way, tables};
 use super::text::Described;
@@ -34,12 +33,9 @@ pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
 const INTRODUCTION: &str = "\
 # The scenario file
 
-This page lists every table and key of the scenario file; the [glossary](glossary.md) explains the terms. `cargo run --release -p closecall-xtask -- write-references` writes the page
-from the program. Descriptions are doc comments of the code, ranges are the checks of `closecall check`, and examples are
-values of [every-key.toml](scenario/every-key.toml), a scenario that uses every key. A test fails if page and program differ.
-
-## An annotated example
-
+This page lists every table and key of the scenario file, as `cargo run --release -p closecall-xtask -- write-references`
+writes them from the program. [annotated.toml](scenario/annotated.toml) is an example with comments, and
+[every-key.toml](scenario/every-key.toml) uses every key. The [glossary](glossary.md) explains the terms.
 ";
 
 const READING: &str = "
@@ -50,7 +46,7 @@ const READING: &str = "
 - The end of a key is its unit: `gap-m` is in metres, `speed-mps` in metres per second.
 - *number* is a finite number, or `\"$name\"`: the value of the parameter `name` in [`[parameters]`](#parameters-NAME).
   Only parameters are sampled. A *fixed number* cannot be a parameter. *word* is one of the words below the table, or
-  `\"$name\"` where the table says so.
+  `\"$name\"` where the table says so. *flag* is `true` or `false`.
 - *Default* is the value of an absent key. A *required* key has no default. `-` means that an absent key has no effect, or
   that the text says what holds.
 - `--set` changes a value by the path in the heading of its section. The name of a parameter alone fixes the parameter:
@@ -65,14 +61,7 @@ pub(crate) fn scenario_page() -> Result<String, Box<dyn Error>> {
     let probe = Probe::new()?;
     let schema = schemars::schema_for!(ScenarioConfig);
     let tables = tables(schema.as_value(), &|key| probe.position(key));
-    let annotated = std::fs::read_to_string(at_root(ANNOTATED))?;
-    let mut page = format!("{INTRODUCTION}```toml\n{annotated}```\n{READING}");
-    writeln!(page, "## The tables\n")?;
-    for table in &tables {
-        // The heading of a section names its other places, too.
-        let way = &table.ways[0];
-        writeln!(page, "{}- [`{}`](#{})", "  ".repeat(way.len().saturating_sub(1).min(3)), title(way), anchor(way))?;
-    }
+    let mut page = format!("{INTRODUCTION}{READING}");
     for table in &tables {
         section(&mut page, table, &tables, &probe)?;
     }
@@ -94,7 +83,7 @@ fn section(page: &mut String, table: &Table, all: &[Table], probe: &Probe) -> Re
     if table.is_choice {
         writeln!(page, "Exactly one of these keys is given.\n\n| key | value | meaning |\n|---|---|---|")?;
     } else {
-        writeln!(page, "| key | value | unit | default | example | meaning |\n|---|---|---|---|---|---|")?;
+        writeln!(page, "| key | value | default | meaning |\n|---|---|---|---|")?;
     }
     for key in &table.keys {
         row(page, table, key, all, probe)?;
@@ -108,23 +97,25 @@ fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe
     let inner: Vec<Way> = table.ways.iter().map(|way| with(way, Step::Key(key.name.clone()))).collect();
     let given = inner.iter().flat_map(|way| probe.values(way)).next();
     let value = value(key, &inner, all, probe);
-    let meaning = described.meaning.replace('|', "\\|");
+    let meaning = without_bounds(&described.meaning, &value).replace('|', "\\|");
     if table.is_choice {
         writeln!(page, "| `{}` | {value} | {meaning} |", key.name)?;
         return Ok(());
     }
-    let unit = described.unit.as_deref().unwrap_or("");
+    let value = described.unit.map_or(value.clone(), |unit| format!("{value} ({unit})"));
     let example = match given {
-        Some((_, example)) if is_short(&key.kind) => format!("`{example}`"),
+        Some((_, example)) if is_list(&key.kind) => format!(" Example: `{example}`."),
         _ => String::new(),
     };
-    writeln!(
-        page,
-        "| `{}` | {value} | {unit} | {} | {example} | {meaning} |",
-        key.name,
-        default(key, described.default)
-    )?;
+    writeln!(page, "| `{}` | {value} | {} | {meaning}{example} |", key.name, default(key, described.default))?;
     Ok(())
+}
+
+/// Leaves the bounds of a value out of the meaning of its key: the column of the value has them.
+fn without_bounds(meaning: &str, value: &str) -> String {
+    let Some((_, bounds)) = value.split_once(", ") else { return meaning.to_owned() };
+    let stated = [format!(": {bounds}"), format!(", {bounds}"), format!(" ({bounds})")];
+    stated.iter().fold(meaning.to_owned(), |meaning, bounds| meaning.replacen(bounds, "", 1))
 }
 
 /// The kind of a key's value, and the allowed values. `ways` are all of its places.
@@ -165,7 +156,7 @@ fn name(kind: &Kind) -> String {
         Kind::Number { sampled: true } => "number".to_owned(),
         Kind::Number { sampled: false } => "fixed number".to_owned(),
         Kind::Whole => "whole number".to_owned(),
-        Kind::Flag => "`true` or `false`".to_owned(),
+        Kind::Flag => "flag".to_owned(),
         Kind::Text => "text".to_owned(),
         Kind::Word { sampled: true, .. } => "word or `\"$name\"`".to_owned(),
         Kind::Word { sampled: false, .. } => "word".to_owned(),
@@ -214,11 +205,11 @@ fn is_sensor_key(key: &Key, name: &str) -> bool {
     key.name == name && key.default.is_none()
 }
 
-fn is_short(kind: &Kind) -> bool {
+/// True if the value has several parts, whose form an example shows.
+fn is_list(kind: &Kind) -> bool {
     match kind {
-        Kind::Table => false,
         Kind::List(element) | Kind::Map(element) => **element != Kind::Table,
-        _ => true,
+        kind => matches!(kind, Kind::Tuple(..)),
     }
 }
 

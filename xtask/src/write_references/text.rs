@@ -5,8 +5,9 @@ const UNITS: [&str; 15] =
     ["m/s³", "m/s²", "m/s", "rad/s", "10⁻⁴ rad/s", "1/m", "mm/h", "mm", "m", "s", "rad", "deg", "kg", "EV", "0 to 1"];
 
 /// The ends of keys with their units. If one end is the end of another, the longer stands first.
-const ENDS: [(&str, &str); 12] = [
+const ENDS: [(&str, &str); 13] = [
     ("-mm-per-h", "mm/h"),
+    ("-per-s", "1/s"),
     ("-per-m", "1/m"),
     ("-mps3", "m/s³"),
     ("-mps2", "m/s²"),
