@@ -18,11 +18,12 @@ use crate::support::{closecall, code, folder, library, message, program, records
 const TIMEOUT_MS: &str = "2000";
 
 /// The faults of `bad.sh`: its arguments, and a part of the error message.
-const FAULTS: [(&str, &str); 22] = [
+const FAULTS: [(&str, &str); 23] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
     ("hangs", "the process hangs: no answer in twice the 2000 ms allowed, after 1 answer"),
+    ("deaf", "no answer in twice the 2000 ms allowed, after 2 answers; it has closed its standard input"),
     ("buffers", "before its first answer; an answer is one line, which ends with a line feed and is flushed"),
     ("late 3", "the process answered later than the 2000 ms allowed, after 1 answer"),
     ("garbage", "the process answered \"what?\", which is not JSON"),

@@ -12,6 +12,7 @@ use std::os::unix::fs::FileExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread;
@@ -90,6 +91,8 @@ pub struct Child {
     answered: u64,
     /// The file that tells the resident memory of the process, if the system has one.
     resident: Option<File>,
+    /// True from the first line on that it cannot be given, because it has closed its standard input.
+    has_closed_input: Arc<AtomicBool>,
     /// When the memory of its descendants was looked at last.
     tree_looked: Instant,
     /// Whether the process has failed. It is then killed without time to end by itself.
@@ -114,7 +117,11 @@ impl Child {
         };
         let start_error = |source: io::Error| ExecError::Start {
             program: program.clone(),
-            reason: start::reason(&path, &source),
+            reason: start::reason(
+                program,
+                &folder.map_or_else(|| path.clone(), |folder| folder.join(program)),
+                &source,
+            ),
             source,
         };
         let mut command = Command::new(&path);
@@ -142,6 +149,7 @@ impl Child {
             group: None,
             answered: 0,
             resident: None,
+            has_closed_input: Arc::default(),
             tree_looked: Instant::now(),
             has_failed: true,
             entry: Some(entry),
@@ -149,7 +157,9 @@ impl Child {
         child.group = Group::of(child.process.id(), settings.memory_mib);
         child.resident = File::open(format!("/proc/{}/statm", child.process.id())).ok();
         if let (Some(stdin), Some(stdout), Some(stderr)) = pipes {
-            spawn_thread("write", move || write_all(stdin, &request_receiver)).map_err(start_error)?;
+            let has_closed_input = Arc::clone(&child.has_closed_input);
+            spawn_thread("write", move || write_all(stdin, &request_receiver, &has_closed_input))
+                .map_err(start_error)?;
             spawn_thread("read", move || read_lines(stdout, &answer_sender)).map_err(start_error)?;
             spawn_thread("listen", move || drain(stderr, &stderr_tail, end_sender)).map_err(start_error)?;
         }
@@ -340,8 +350,9 @@ impl Child {
             None => Err(match if is_long(limit.as_millis()) { None } else { self.wait(limit, MemoryLook::Step)? } {
                 Some(_) => ExecError::Late { limit_ms: limit.as_millis(), answered: self.answered },
                 None => {
+                    let has_closed_input = self.has_closed_input.load(Ordering::Relaxed);
                     let (limit_ms, answered, stderr) = (limit.as_millis(), self.answered, self.last_lines());
-                    ExecError::Hangs { limit_ms, answered, stderr }
+                    ExecError::Hangs { limit_ms, answered, has_closed_input, stderr }
                 }
             }),
         }
@@ -560,10 +571,11 @@ fn spawn_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Re
 }
 
 /// Writes every received line to standard input.
-fn write_all(mut stdin: ChildStdin, lines: &Receiver<Vec<u8>>) {
+fn write_all(mut stdin: ChildStdin, lines: &Receiver<Vec<u8>>, has_closed_input: &AtomicBool) {
     // A process that has stopped reading does not answer, which `request` reports.
     while let Ok(line) = lines.recv() {
         if stdin.write_all(&line).and_then(|()| stdin.flush()).is_err() {
+            has_closed_input.store(true, Ordering::Relaxed);
             return;
         }
     }

@@ -64,14 +64,17 @@ pub enum ExecError {
     },
     /// The process did not answer within twice the time limit, or within a long limit.
     #[error(
-        "the process hangs: no answer in {}the {limit_ms} ms allowed, {}{}",
-        if is_long(*limit_ms) { "" } else { "twice " }, when(*answered), last_lines(stderr)
+        "the process hangs: no answer in {}the {limit_ms} ms allowed, {}{}{}",
+        if is_long(*limit_ms) { "" } else { "twice " }, when(*answered),
+        if *has_closed_input { "; it has closed its standard input" } else { "" }, last_lines(stderr)
     )]
     Hangs {
         /// The time limit (ms).
         limit_ms: u128,
         /// Number of answers before, including the greeting.
         answered: u64,
+        /// True if it has closed its standard input.
+        has_closed_input: bool,
         /// The last lines of its standard error.
         stderr: String,
     },

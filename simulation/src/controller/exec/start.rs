@@ -1,6 +1,6 @@
 //! Why a program that is there cannot be started. The system answers "No such file or directory" if
 //! the *interpreter* of a script is absent, "Exec format error" if a script names none, and
-//! "Permission denied" of a file without the right to run.
+//! "Permission denied" of a file without the right to run. A bare name is looked for in `PATH` alone.
 
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::PermissionsExt;
@@ -13,17 +13,19 @@ use rustix::io::Errno;
 /// script (bytes; `BINPRM_BUF_SIZE` of Linux).
 const MOST_BYTES: u64 = 256;
 
-/// Returns why the program at a path cannot be started, in words, or `None` if the error of the
-/// system says it.
-pub(super) fn reason(path: &Path, error: &io::Error) -> Option<String> {
+/// Returns why a program cannot be started, in words, or `None` if the error of the system says it.
+/// `path` is the file of its name.
+pub(super) fn reason(program: &str, path: &Path, error: &io::Error) -> Option<String> {
     let is_absent = error.kind() == ErrorKind::NotFound;
     let has_other_format = error.raw_os_error() == Some(Errno::NOEXEC.raw_os_error());
     if error.kind() == ErrorKind::PermissionDenied {
         return denied(path);
     }
-    // A bare name is looked for in PATH.
-    if !(is_absent || has_other_format) || path.components().count() < 2 || !path.is_file() {
+    if !(is_absent || has_other_format) || !path.is_file() {
         return None;
+    }
+    if !program.contains('/') {
+        return is_absent.then(|| not_in_path(program));
     }
     let mut beginning = Vec::new();
     input::open(path).ok()?.take(MOST_BYTES).read_to_end(&mut beginning).ok()?;
@@ -37,6 +39,13 @@ pub(super) fn reason(path: &Path, error: &io::Error) -> Option<String> {
                 .to_owned(),
         ),
     }
+}
+
+/// Returns why a program without a folder is not found, although a file of its name is there.
+fn not_in_path(program: &str) -> String {
+    format!(
+        "no folder in PATH has it; for the file here, write `./{program}`, or name its interpreter, such as `python3`"
+    )
 }
 
 /// Returns why the system denies to start the program at a path, if that can be told.
@@ -61,4 +70,17 @@ fn absent_interpreter(line: &str) -> Option<String> {
     }
     let lines = if interpreter.ends_with('\r') { ": its lines end with CR LF, and LF is needed" } else { "" };
     Some(format!("its line 1 names the interpreter `{}`, which is not there{lines}", interpreter.escape_debug()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_here_needs_its_folder_or_its_interpreter() {
+        let absent = io::Error::from(ErrorKind::NotFound);
+        let told = |name: &str| reason(name, Path::new(name), &absent);
+        assert!(told("Cargo.toml").is_some_and(|why| why.contains("write `./Cargo.toml`")));
+        assert_eq!(told("no-such-file"), None, "the system's words are enough");
+    }
 }
