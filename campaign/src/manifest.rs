@@ -393,10 +393,18 @@ fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>
         }
         _ if there == here => {}
         _ => {
-            let (there, here) = (shortened(&there.to_string()), shortened(&here.to_string()));
+            let [there, here] =
+                [there, here].map(|value| shortened(&names(value).unwrap_or_else(|| value.to_string())));
             differences.push(format!("{key}: {there} there, {here} here"));
         }
     }
+}
+
+/// Returns the names of the elements of a list that all have one; `None` of another value.
+fn names(value: &Value) -> Option<String> {
+    let name = |element: &Value| element.get("name")?.as_str().map(str::to_owned);
+    let names: Option<Vec<String>> = value.as_array()?.iter().map(name).collect();
+    names.filter(|names| !names.is_empty()).map(|names| names.join(", "))
 }
 
 /// Largest number of characters of a value in a message.
@@ -617,5 +625,8 @@ mod tests {
                 "sensors: null there, \"full\" here",
             ]
         );
+        let mut longer = manifest();
+        longer.scenarios.push(ManifestScenario { name: "twin".to_owned(), ..longer.scenarios[0].clone() });
+        assert_eq!(manifest().differences(&longer), ["scenarios: headline there, headline, twin here"]);
     }
 }
