@@ -25,6 +25,8 @@ pub enum Action<'a> {
         /// The controller; `None` for the usual one.
         controller: Option<&'a str>,
     },
+    /// Runs the command that started a campaign again.
+    Repeat(&'a [String]),
     /// Resumes a campaign.
     Resume(Resume<'a>),
     /// Resumes the campaign in this folder, which another user or another machine has written: with

@@ -199,23 +199,33 @@ impl Finding {
     /// Returns the finding about a scenario in a line with the words of every gate: standing,
     /// scenario, the value and the required one, and the criterion with its origin.
     pub fn line(&self, scenario: &str, counts: &ArmCounts, source: &GateSource) -> String {
+        let (standing, words) = (self.standing().word(), self.words(counts));
+        format!("{standing}: {scenario}: {words} [{}; from {source}]", self.criterion())
+    }
+
+    /// Returns the criterion, as the command line has it.
+    pub fn criterion(&self) -> String {
+        format!("max-probability {}", self.max)
+    }
+
+    /// Returns the value and the required one, in plain words.
+    pub fn words(&self, counts: &ArmCounts) -> String {
         let (hits, samples) = (counts.collisions, counts.outcomes);
         let share = match samples {
             0 => String::new(),
             samples => format!(" ({})", percent(hits as f64 / samples as f64)),
         };
-        let missing = self.missing.map_or_else(
-            || OpenReason::DependentSamples.text().to_owned(),
-            |missing| undecided(OpenReason::TooFewSamples, missing.total(samples)),
-        );
+        let is_above = hits as f64 > self.max * samples as f64;
+        let missing = match self.missing {
+            None => OpenReason::DependentSamples.text().to_owned(),
+            Some(_) if is_above => format!("{}, and more like these would miss it", OpenReason::TooFewSamples.text()),
+            Some(missing) => undecided(OpenReason::TooFewSamples, missing.total(samples)),
+        };
         let open = if self.answer == Answer::Open { format!(" ({missing})") } else { String::new() };
         format!(
-            "{}: {scenario}: share of the samples in which the ego collides: {hits} of {samples}{share}, {}{open}; required: at \
-             most {} [max-probability {}; from {source}]",
-            self.standing().word(),
+            "share of the samples in which the ego collides: {hits} of {samples}{share}, {}{open}; required: at most {}",
             self.bounds(),
-            percent(self.max),
-            self.max
+            percent(self.max)
         )
     }
 }
@@ -305,7 +315,7 @@ mod tests {
             (
                 3,
                 "3 of 200 (1.5 %), one-sided 95 % bounds 0.41 % and 3.83 %",
-                "too few samples to decide, and no number would if they are like these",
+                "too few samples to decide, and more like these would miss it",
             ),
         ] {
             assert_eq!(line(collisions, 200), said("open", &format!("{measured} ({missing})")));

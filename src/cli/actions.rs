@@ -17,6 +17,9 @@ pub(super) fn command_for(action: &Action<'_>) -> String {
         Action::Run { file, controller } => {
             format!("closecall run {}{}", quoted(file), option("--controller", controller))
         }
+        // The call of another program is one word.
+        Action::Repeat([call]) => call.clone(),
+        Action::Repeat(words) => words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
         Action::Resume(resume) => resume_command(resume),
         Action::ResumeForeign(folder) => format!("closecall campaign SCENARIO … --out {} --resume", quoted(folder)),
         Action::View { folder, is_in_browser: false } => format!("closecall view --recordings {}", quoted(folder)),
@@ -122,6 +125,15 @@ mod tests {
             let command = resumed(&format!("c campaign x {named} -n 4"), false, Some("r/new"));
             assert!(command.contains(" r/new -n 4 --resume") && !command.contains("r/old"), "{command}");
         }
+    }
+
+    #[test]
+    fn a_command_that_is_shown_can_be_copied_into_a_shell() {
+        let command = ["closecall", "campaign", "a.toml", "--gate", "upper(induced) <= 0.02"].map(str::to_owned);
+        let shown = "closecall campaign a.toml --gate 'upper(induced) <= 0.02'";
+        assert_eq!(command_for(&Action::Repeat(&command)), shown);
+        let call = ["closecall.campaign(['x'], out='y')".to_owned()];
+        assert_eq!(command_for(&Action::Repeat(&call)), call[0], "a call in Python is no command of a shell");
     }
 
     #[test]

@@ -192,6 +192,9 @@ fn verdict_of(part: &Path, records: &[Record], gates: &[String], out: &Path) -> 
         // A number keeps its percent sign in its line.
         let escaped = escaped.replace(" %", "\u{a0}%");
         assert!(page.contains(&escaped) && summary.contains(reason), "{context}: {reason}");
+        if let Some((words, _)) = reason.split_once(" [max-probability ") {
+            assert!(junit.contains(words), "{context}: {words}: {junit}");
+        }
     }
     word.to_owned()
 }

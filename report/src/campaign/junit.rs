@@ -23,22 +23,22 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use closecall_campaign::action::Action;
 use closecall_campaign::arm_pairs::{PairResult, pair_results};
 use closecall_campaign::gate::{GateResult, Standing};
 use closecall_campaign::probability::Answer;
-use closecall_campaign::summary::Counts;
+use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::{Judgement, Verdict};
 use closecall_traffic::atomic::{WriteError, write_file};
-use closecall_traffic::statistics::format::percent;
 use closecall_traffic::words::counted;
 use quick_xml::Writer;
-use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
+use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
 use super::findings::Findings;
 use super::overview::ErrorGroup;
 use super::recordings::card_beside;
 use super::samples_xml::legal_xml;
-use super::words::{gate_line, reasons};
+use super::words::{gate_line, probability_line, reasons};
 
 /// The answer of one case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ struct Case {
 /// The suite of what concerns all scenarios together.
 const CAMPAIGN_SUITE: &str = "campaign";
 
-fn cases(judged: &Judgement) -> Vec<Case> {
+fn cases(judged: &Judgement, summary: &Summary) -> Vec<Case> {
     let is_measured = judged.verdict().is_none();
     let gate = |gate: &GateResult| Case {
         suite: gate.scenario.clone(),
@@ -84,7 +84,7 @@ fn cases(judged: &Judgement) -> Vec<Case> {
                 Answer::Above => Status::Failed,
                 Answer::Open => Status::Error,
             },
-            message: format!("{}; required: at most {}", finding.bounds(), percent(finding.max)),
+            message: probability_line(scenario, finding, summary),
         });
     }
     if let Some(gate) = judged.flaky {
@@ -123,7 +123,7 @@ pub fn write_junit(path: &Path, findings: &Findings<'_>, wall_s: &[(String, f64)
 }
 
 fn report(file: impl Write, findings: &Findings<'_>, wall_s: &[(String, f64)]) -> io::Result<()> {
-    let cases = cases(findings.judged);
+    let cases = cases(findings.judged, findings.summary);
     let mut xml = Writer::new_with_indent(file, b' ', 4);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let all: Vec<&Case> = cases.iter().collect();
@@ -166,7 +166,7 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
     let mut properties = vec![
         ("seed".to_owned(), manifest.sampling.seed.to_string()),
         ("closecall".to_owned(), manifest.closecall_version.clone()),
-        ("command".to_owned(), manifest.command.join(" ")),
+        ("command".to_owned(), (findings.command_for)(&Action::Repeat(&manifest.command))),
     ];
     properties.extend(manifest.settings().iter().map(|setting| ("setting".to_owned(), setting.to_string())));
     if let Some((_, counts)) = findings.summary.scenarios.iter().find(|(name, _)| name == suite) {
@@ -230,9 +230,16 @@ fn write_case<W: Write>(xml: &mut Writer<W>, case: &Case, share_s: f64) -> io::R
         Status::Error => Some("error"),
         Status::Skipped => Some("skipped"),
     };
-    if let Some(element) = element {
-        let element = xml.create_element(element).with_attribute(("message", legal_xml(&case.message).as_str()));
-        element.with_attribute(("type", "gate")).write_empty()?;
+    let message = legal_xml(&case.message);
+    match element {
+        Some(element) => {
+            let element = xml.create_element(element).with_attribute(("message", message.as_str()));
+            element.with_attribute(("type", "gate")).write_empty()?;
+        }
+        // What is met is read with its value, too.
+        None => {
+            xml.create_element("system-out").write_text_content(BytesText::new(&message))?;
+        }
     }
     xml.write_event(Event::End(BytesEnd::new("testcase")))
 }

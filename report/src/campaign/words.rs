@@ -11,6 +11,8 @@
 //! the terminal, many are above it.
 
 use closecall_campaign::gate::{Answer, Certainty, Evaluation, GateResult, GateSource, RequirementResult, Standing};
+use closecall_campaign::probability::Finding;
+use closecall_campaign::summary::Summary;
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::criteria::{Aggregate, Comparison, Operator, Quantity, Side};
 use closecall_traffic::statistics::format::{DIGITS, percent, significant, without_trailing_zeros};
@@ -142,6 +144,13 @@ pub(crate) fn gate_line(gate: &GateResult) -> String {
         source => format!("; from {source}"),
     };
     format!("{}: {scenario}: {mark}{} [{}{source}]", gate.standing().word(), gate_words(gate), gate.expression)
+}
+
+/// Returns the line of a gate on the probability of a collision in a scenario, in the words of every
+/// gate.
+pub(crate) fn probability_line(scenario: &str, finding: &Finding, summary: &Summary) -> String {
+    let words = summary.tested(scenario).map_or_else(String::new, |counts| finding.words(counts));
+    format!("{}: {scenario}: {words} [{}]", finding.standing().word(), finding.criterion())
 }
 
 /// Returns the value of a gate and its required value, in plain words.

@@ -1,5 +1,6 @@
 //! Everything that a repetition of the campaign needs, and the sources of the sampled values.
 
+use closecall_campaign::action::Action;
 use closecall_scenarios::parameters::Provenance;
 use closecall_traffic::words::counted;
 use maud::{Markup, html};
@@ -43,7 +44,8 @@ pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
 
 fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     let manifest = findings.manifest;
-    let mut entries = vec![("closecall", manifest.closecall_version.clone()), ("command", manifest.command.join(" "))];
+    let command = (findings.command_for)(&Action::Repeat(&manifest.command));
+    let mut entries = vec![("closecall", manifest.closecall_version.clone()), ("command", command)];
     // Everything that determines the outcomes: two pages with the same hash show the same campaign.
     if let Some(json) = manifest.determining_json() {
         entries.push(("configuration", format!("BLAKE3 {}", blake3::hash(json.as_bytes()).to_hex())));

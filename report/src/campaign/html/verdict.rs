@@ -1,11 +1,14 @@
 //! The verdict with its reasons, and the requirements.
 
+use std::cmp::Reverse;
+
 use maud::{Markup, html};
 
 use super::page::{breakable, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::words::{gate_words, is_said, sentence, worst_first};
 use closecall_campaign::gate::{GateResult, Standing};
+use closecall_campaign::probability::Finding;
 use closecall_campaign::verdict::Verdict;
 use closecall_scenarios::causal::LETTERS;
 use closecall_traffic::words::counted;
@@ -77,9 +80,13 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
 /// the campaign has no baseline.
 fn headline(findings: &Findings<'_>) -> String {
     let total = findings.summary.total();
+    let outcomes = total.arms.last().map_or(0, |arm| arm.outcomes);
+    if outcomes == 0 {
+        return "no sample has an outcome".to_owned();
+    }
     if !findings.summary.is_paired() {
         let collisions = total.arms.first().map_or(0, |arm| arm.collisions);
-        return format!("the ego collides in {collisions} of {}", counted(total.samples, "sample"));
+        return format!("the ego collides in {collisions} of {}", counted(outcomes, "sample"));
     }
     let pairs = total.pairs;
     let without = pairs.prevented + pairs.both;
@@ -102,27 +109,59 @@ fn badge(standing: Standing) -> Markup {
     html! { span.badge.(standing_class(standing)) { (standing.word()) } }
 }
 
+/// A row of the table of gates.
+struct GateRow<'a> {
+    standing: Standing,
+    scenario: &'a str,
+    source: String,
+    words: String,
+    criterion: String,
+}
+
+/// Returns a row for each gate, each check of a requirement, and each gate on the probability of a
+/// collision, the worst first.
+fn gate_rows<'a>(findings: &Findings<'a>) -> Vec<GateRow<'a>> {
+    let of_gate = |gate: &'a GateResult| GateRow {
+        standing: gate.standing(),
+        scenario: &gate.scenario,
+        source: gate.source.to_string(),
+        words: gate_words(gate),
+        criterion: gate.expression.to_string(),
+    };
+    let of_probability = |(scenario, finding): &'a (String, Finding)| GateRow {
+        standing: finding.standing(),
+        scenario,
+        source: "-".to_owned(),
+        words: findings.summary.tested(scenario).map_or_else(String::new, |counts| finding.words(counts)),
+        criterion: finding.criterion(),
+    };
+    let gates = worst_first(findings.judged).into_iter().map(of_gate);
+    let mut rows: Vec<GateRow<'a>> = gates.chain(findings.judged.probabilities.iter().map(of_probability)).collect();
+    rows.sort_by_key(|row| Reverse(row.standing));
+    rows
+}
+
 /// Returns the gates and requirement checks in plain words, the worst first. Met ones are folded.
 /// Empty if there is none.
 pub(super) fn gates(findings: &Findings<'_>) -> Markup {
-    if findings.judged.gates.is_empty() {
+    let gates = gate_rows(findings);
+    if gates.is_empty() {
         return Markup::default();
     }
-    let gates = worst_first(findings.judged);
-    let with = |standing: Standing| gates.iter().copied().filter(move |gate| gate.standing() == standing);
+    let with = |standing: Standing| gates.iter().filter(move |gate| gate.standing == standing);
     let (missed, undecided) = (with(Standing::Fail).count(), with(Standing::Inconclusive).count());
     let most_undecided = if missed == 0 { UNDECIDED_ALONE } else { UNDECIDED_BESIDE };
-    let first: Vec<&GateResult> =
+    let first: Vec<&GateRow<'_>> =
         with(Standing::Fail).take(MISSED).chain(with(Standing::Inconclusive).take(most_undecided)).collect();
-    let others: Vec<&GateResult> =
+    let others: Vec<&GateRow<'_>> =
         with(Standing::Fail).skip(MISSED).chain(with(Standing::Inconclusive).skip(most_undecided)).collect();
-    let met: Vec<&GateResult> = gates.iter().copied().filter(|gate| gate.standing() <= Standing::NotChecked).collect();
+    let met: Vec<&GateRow<'_>> = gates.iter().filter(|gate| gate.standing <= Standing::NotChecked).collect();
     let of_others = format!(
         "further gates: {} not met, {} undecided",
         missed.saturating_sub(MISSED),
         undecided.saturating_sub(most_undecided)
     );
-    let unchecked = met.iter().filter(|gate| gate.standing() == Standing::NotChecked).count();
+    let unchecked = met.iter().filter(|gate| gate.standing == Standing::NotChecked).count();
     let counted = match unchecked {
         0 => format!("{} of {} gates are met", met.len(), gates.len()),
         _ => format!("{} of {} gates are met, {unchecked} not checked", met.len() - unchecked, gates.len()),
@@ -141,16 +180,16 @@ pub(super) fn gates(findings: &Findings<'_>) -> Markup {
     }
 }
 
-fn gate_table(gates: &[&GateResult]) -> Markup {
+fn gate_table(gates: &[&GateRow<'_>]) -> Markup {
     let head = text_heads(&["result", "scenario", "from", "found and required", "criterion"]);
     let rows = html! {
         @for gate in gates {
             tr {
-                td { (badge(gate.standing())) }
+                td { (badge(gate.standing)) }
                 td { (gate.scenario) }
-                td { (gate.source.to_string()) }
-                td { (gate_words(gate)) }
-                td { code { (breakable(&gate.expression.to_string())) } }
+                td { (gate.source) }
+                td { (gate.words) }
+                td { code { (breakable(&gate.criterion)) } }
             }
         }
     };
