@@ -290,7 +290,7 @@ pub const MEASURES: &[Measure] = &[
     number(
         "impact_speed_mps",
         SPEED,
-        "largest relative speed with which the ego strikes another vehicle; 0 if it strikes none",
+        "largest relative speed with which the ego strikes another vehicle (0 if it strikes none)",
         |outcome| Some(outcome.ego_strikes().map(|collision| collision.relative_speed_mps).fold(0.0, worse)),
     ),
     number("max_deceleration_mps2", BRAKING, "largest deceleration of the ego before it collides", |outcome| {
@@ -317,12 +317,9 @@ pub const MEASURES: &[Measure] = &[
         "largest deceleration of the vehicle behind before the lead vehicle brakes",
         |outcome| cost(outcome, |cost| cost.imposed_braking_mps2),
     ),
-    number(
-        "delta_v_mps",
-        SPEED,
-        "largest change of the ego's velocity in a collision; 0 if it does not collide",
-        |outcome| Some(outcome.ego_delta_v_mps().unwrap_or(0.0)),
-    ),
+    number("delta_v_mps", SPEED, "largest change of the ego's velocity in a collision (0 without one)", |outcome| {
+        Some(outcome.ego_delta_v_mps().unwrap_or(0.0))
+    }),
     number("harm", NOT_NEGATIVE, "driver deaths expected from all collisions of the sample", |outcome| {
         Some(harm(outcome))
     }),
