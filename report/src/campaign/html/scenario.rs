@@ -57,19 +57,28 @@ fn worst_scenario<'a>(findings: &Findings<'a>) -> Option<&'a ScenarioOverview> {
     worst_first(findings.judged).first().and_then(|gate| named(&gate.scenario)).or(scenarios.first())
 }
 
-/// Returns the title of the evidence: samples of all scenarios, and the map of this one.
-fn evidence_title(scenarios: usize, mapped: Option<&str>) -> String {
+/// Returns the title of the evidence: samples of all scenarios, and the map of this one. `None` if
+/// there is neither.
+fn evidence_title(scenarios: usize, has_samples: bool, mapped: Option<&str>) -> Option<String> {
     let samples = if scenarios > 1 { "Worst samples of all scenarios" } else { "Worst samples" };
-    mapped.map_or(samples.to_owned(), |mapped| format!("{samples}, and the map of {mapped}"))
+    match (has_samples, mapped) {
+        (true, Some(mapped)) => Some(format!("{samples}, and the map of {mapped}")),
+        (true, None) => Some(samples.to_owned()),
+        (false, mapped) => mapped.map(|mapped| format!("The map of {mapped}")),
+    }
 }
 
 /// Returns the evidence that is looked at first: the outcome map of the worst scenario, and
-/// pictures of the worst samples.
+/// pictures of the worst samples. Without any outcome there is no map.
 pub(super) fn evidence(findings: &Findings<'_>) -> io::Result<Markup> {
     let stills = findings.worst_stills();
-    let worst = worst_scenario(findings);
+    let has_outcome = |scenario: &&ScenarioOverview| scenario.points().any(|point| point.fate != Fate::Error);
+    let worst = worst_scenario(findings).filter(has_outcome);
+    let mapped = worst.map(|worst| worst.name.as_str());
+    let title = evidence_title(findings.overview.scenarios.len(), !stills.is_empty(), mapped);
+    let Some(title) = title else { return Ok(Markup::default()) };
     Ok(html! {
-        h2 { (evidence_title(findings.overview.scenarios.len(), worst.map(|worst| worst.name.as_str()))) }
+        h2 { (title) }
         @if !stills.is_empty() {
             div.stills {
                 @for (still, recording) in stills {
@@ -192,8 +201,11 @@ mod tests {
 
     #[test]
     fn the_title_does_not_give_the_samples_of_several_scenarios_to_the_mapped_one() {
-        assert_eq!(evidence_title(1, Some("a")), "Worst samples, and the map of a");
-        assert_eq!(evidence_title(2, Some("a")), "Worst samples of all scenarios, and the map of a");
-        assert_eq!(evidence_title(2, None), "Worst samples of all scenarios");
+        let title = |scenarios, has_samples, mapped| evidence_title(scenarios, has_samples, mapped).unwrap_or_default();
+        assert_eq!(title(1, true, Some("a")), "Worst samples, and the map of a");
+        assert_eq!(title(2, true, Some("a")), "Worst samples of all scenarios, and the map of a");
+        assert_eq!(title(2, true, None), "Worst samples of all scenarios");
+        assert_eq!(title(2, false, Some("a")), "The map of a");
+        assert_eq!(evidence_title(1, false, None), None, "a page without an outcome has neither");
     }
 }
