@@ -62,7 +62,7 @@ book:
 xtask *arguments:
     cargo run --release -p closecall-xtask -- "$@"
 
-# Runs a benchmark: camera, lidar, perception, recording, simulation or stages.
+# Runs a benchmark: camera, lidar or recording.
 [positional-arguments]
 bench *arguments:
     cargo bench -p closecall-xtask --bench "$@"

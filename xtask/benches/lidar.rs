@@ -1,12 +1,10 @@
-//! Measures the time of one LiDAR scan and of its processing, and the share of each part in a
-//! perception step without the camera. A rear vehicle is 3, 30 or 100 m behind the ego, and two
-//! more vehicles are in view.
+//! Measures the time of one LiDAR scan, of each part of its processing, and of a whole perception
+//! step without the camera. A rear vehicle is 3, 30 or 100 m behind the ego, and two more vehicles
+//! are in view.
 //!
 //! Command: `cargo bench -p closecall-xtask --bench lidar`.
-#![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, Scanner};
 use closecall_sensors::tracking::{RearView, TrackList, Tracker, TrackerScan};
@@ -15,7 +13,7 @@ use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Stream, Time, Vehicle, VehicleClass, VehicleState,
     stream,
 };
-use criterion::{Criterion, criterion_group, criterion_main};
+use divan::Bencher;
 
 /// Position of the ego along the road (m).
 const EGO_S_M: f64 = 1_000.0;
@@ -27,8 +25,6 @@ const REAR_S_M: f64 = EGO_S_M - 2.3;
 const SPEED_MPS: f64 = 30.0;
 /// Gaps between the ego and the rear vehicle (m).
 const GAPS_M: [f64; 3] = [3.0, 30.0, 100.0];
-/// Number of steps over which the shares are measured.
-const STEPS: u32 = 2_000;
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicle {
     let state = VehicleState { s_m, d_m, speed_mps: SPEED_MPS, ..VehicleState::default() };
@@ -105,68 +101,57 @@ impl TrackerLoop {
     }
 }
 
-fn scan_and_detect(criterion: &mut Criterion) {
-    let road = Road::straight(3);
-    for gap_m in GAPS_M {
-        let others = others(gap_m);
-        let scene = self::scene(&road, &others);
-        let lane = LaneGeometry::from_scene(&scene);
-        let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
-        let mut group = criterion.benchmark_group(format!("rear vehicle at {gap_m} m"));
-        group.bench_function("scan", |bencher| {
-            bencher.iter(|| black_box(scanner.scan(black_box(&scene), &mut rng).len()));
-        });
-        let scan = scanner.scan(&scene, &mut random()).clone();
-        group.bench_function("clustering", |bencher| {
-            bencher.iter(|| detector.cluster(black_box(&scan), &lane).expect("finite points"));
-        });
-        group.bench_function("clustering and boxes", |bencher| {
-            bencher.iter(|| black_box(detector.detect(black_box(&scan), &lane).expect("finite points").len()));
-        });
-        let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
-        let mut tracker_loop = TrackerLoop::new(road);
-        group.bench_function("tracking", |bencher| bencher.iter(|| tracker_loop.step(black_box(&detections))));
-        group.finish();
-    }
+fn main() {
+    divan::main();
 }
 
-/// Returns the mean time of a call over [`STEPS`] calls (µs).
-fn mean_us(mut part: impl FnMut()) -> f64 {
-    let start = Instant::now();
-    (0..STEPS).for_each(|_| part());
-    start.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS)
+#[divan::bench(args = GAPS_M)]
+fn scan(bencher: Bencher<'_, '_>, gap_m: f64) {
+    let (road, others) = (Road::straight(3), others(gap_m));
+    let scene = self::scene(&road, &others);
+    let (mut scanner, mut rng) = (Scanner::new(Lidar::default()), random());
+    bencher.bench_local(|| scanner.scan(black_box(&scene), &mut rng).len());
 }
 
-/// Prints the mean time of each part, and its share in a perception step without the camera. The
-/// step includes the radars.
-fn shares(_: &mut Criterion) {
-    let road = Road::straight(3);
-    println!("\n{STEPS} steps each: time [us] and share of a whole perception step");
-    println!("gap      scan          clustering      boxes           tracking        whole step");
-    for gap_m in GAPS_M {
-        let others = others(gap_m);
-        let scene = self::scene(&road, &others);
-        let lane = LaneGeometry::from_scene(&scene);
-        let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
-        let scan_us = mean_us(|| _ = black_box(scanner.scan(&scene, &mut rng).len()));
-        let scan = scanner.scan(&scene, &mut random()).clone();
-        let cluster_us = mean_us(|| detector.cluster(black_box(&scan), &lane).expect("finite points"));
-        let detect_us = mean_us(|| _ = black_box(detector.detect(&scan, &lane).expect("finite points").len()));
-        let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
-        let mut tracker_loop = TrackerLoop::new(road);
-        let track_us = mean_us(|| tracker_loop.step(black_box(&detections)));
-        let (mut whole, mut time, mut ego, mut others) = (full(), Time::ZERO, scene.ego, others);
-        let whole_us = mean_us(|| {
-            time += CONTROL_STEP;
-            others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * CONTROL_STEP.s());
-            let scene = Scene { time, ego, ..self::scene(&road, &others) };
-            black_box(whole.step(&scene).expect("finite").len());
-        });
-        let share = |part_us: f64| format!("{part_us:>6.1} ({:>2.0} %)", 100.0 * part_us / whole_us);
-        let parts = [scan_us, cluster_us, detect_us - cluster_us, track_us].map(share);
-        println!("{gap_m:>3} m  {}  {whole_us:>6.1}", parts.join("   "));
-    }
+#[divan::bench(args = GAPS_M)]
+fn clustering(bencher: Bencher<'_, '_>, gap_m: f64) {
+    let (road, others) = (Road::straight(3), others(gap_m));
+    let scene = self::scene(&road, &others);
+    let (mut scanner, mut detector) = (Scanner::new(Lidar::default()), Detector::default());
+    let (scan, lane) = (scanner.scan(&scene, &mut random()), LaneGeometry::from_scene(&scene));
+    bencher.bench_local(|| detector.cluster(black_box(scan), &lane).expect("finite points"));
 }
 
-criterion_group!(benches, scan_and_detect, shares);
-criterion_main!(benches);
+#[divan::bench(args = GAPS_M)]
+fn clustering_and_boxes(bencher: Bencher<'_, '_>, gap_m: f64) {
+    let (road, others) = (Road::straight(3), others(gap_m));
+    let scene = self::scene(&road, &others);
+    let (mut scanner, mut detector) = (Scanner::new(Lidar::default()), Detector::default());
+    let (scan, lane) = (scanner.scan(&scene, &mut random()), LaneGeometry::from_scene(&scene));
+    bencher.bench_local(|| detector.detect(black_box(scan), &lane).expect("finite points").len());
+}
+
+#[divan::bench(args = GAPS_M)]
+fn tracking(bencher: Bencher<'_, '_>, gap_m: f64) {
+    let (road, others) = (Road::straight(3), others(gap_m));
+    let scene = self::scene(&road, &others);
+    let (mut scanner, mut detector) = (Scanner::new(Lidar::default()), Detector::default());
+    let (scan, lane) = (scanner.scan(&scene, &mut random()), LaneGeometry::from_scene(&scene));
+    let detections = detector.detect(scan, &lane).expect("finite points").to_vec();
+    let mut tracker_loop = TrackerLoop::new(road);
+    bencher.bench_local(|| tracker_loop.step(black_box(&detections)));
+}
+
+/// The step includes the radars.
+#[divan::bench(args = GAPS_M)]
+fn whole_step(bencher: Bencher<'_, '_>, gap_m: f64) {
+    let (road, mut others) = (Road::straight(3), others(gap_m));
+    let mut ego = scene(&road, &others).ego;
+    let (mut whole, mut time) = (full(), Time::ZERO);
+    bencher.bench_local(|| {
+        time += CONTROL_STEP;
+        others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * CONTROL_STEP.s());
+        let scene = Scene { time, ego, ..self::scene(&road, &others) };
+        whole.step(&scene).expect("finite").len()
+    });
+}

@@ -4,7 +4,6 @@
 //! Command: `cargo bench -p closecall-xtask --bench recording`.
 
 use std::path::Path;
-use std::time::Duration;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::run::film::{Level, film_arms};
@@ -14,7 +13,7 @@ use closecall_scenarios::{Scenario, ScenarioFile};
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
-use criterion::{Criterion, criterion_group, criterion_main};
+use divan::Bencher;
 
 /// The run that is measured.
 const KEY: RunKey = RunKey { seed: 0, sample: 0 };
@@ -26,27 +25,33 @@ fn headline() -> Scenario {
         .expect("a valid sample")
 }
 
-fn recording(criterion: &mut Criterion) {
-    let scenario = headline();
-    let folder = tempfile::tempdir().expect("a folder");
-    for (name, mode) in [("object", SensorMode::Object), ("full", SensorMode::Full)] {
-        let arms = [BuiltIn::Acc, BuiltIn::Mis].map(|arm| Arm { controller: arm.factory(), sensors: Some(mode) });
-        let film = || film_arms(&scenario, KEY, &arms, Level::Full).expect("an outcome");
-        let mut group = criterion.benchmark_group(format!("recording/{name}"));
-        group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2));
-        group.bench_function("run without film", |bencher| {
-            bencher.iter(|| {
-                let run = |arm| simulate(&scenario, KEY, arm, &mut NoObserver).expect("an outcome");
-                arms.each_ref().map(run)
-            });
-        });
-        group.bench_function("run with film", |bencher| bencher.iter(film));
-        let films = film();
-        let file = folder.path().join("sample.rrd");
-        group.bench_function("file", |bencher| bencher.iter(|| write_recording(&file, &films).expect("written")));
-        group.finish();
-    }
+fn main() {
+    divan::main();
 }
 
-criterion_group!(benches, recording);
-criterion_main!(benches);
+const MODES: [SensorMode; 2] = [SensorMode::Object, SensorMode::Full];
+
+fn arms(mode: SensorMode) -> [Arm; 2] {
+    [BuiltIn::Acc, BuiltIn::Mis].map(|arm| Arm { controller: arm.factory(), sensors: Some(mode) })
+}
+
+#[divan::bench(args = MODES, sample_count = 10)]
+fn run_without_film(bencher: Bencher<'_, '_>, mode: SensorMode) {
+    let (scenario, arms) = (headline(), arms(mode));
+    bencher
+        .bench_local(|| arms.each_ref().map(|arm| simulate(&scenario, KEY, arm, &mut NoObserver).expect("an outcome")));
+}
+
+#[divan::bench(args = MODES, sample_count = 10)]
+fn run_with_film(bencher: Bencher<'_, '_>, mode: SensorMode) {
+    let (scenario, arms) = (headline(), arms(mode));
+    bencher.bench_local(|| film_arms(&scenario, KEY, &arms, Level::Full).expect("an outcome"));
+}
+
+#[divan::bench(args = MODES, sample_count = 10)]
+fn file(bencher: Bencher<'_, '_>, mode: SensorMode) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let film = film_arms(&headline(), KEY, &arms(mode), Level::Full).expect("an outcome");
+    let path = folder.path().join("sample.rrd");
+    bencher.bench_local(|| write_recording(&path, &film).expect("written"));
+}
