@@ -1,5 +1,6 @@
 //! The table of crates in `ARCHITECTURE.md` is the one of the workspace: `cargo metadata` has the
-//! same crates, folders and imports. No library names an option of the command line.
+//! same crates, folders and imports. No library names an option of the command line. What tests
+//! need builds no package of the program again.
 
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
@@ -47,12 +48,17 @@ fn short(package: &str) -> Option<&str> {
     if package == "closecall" { Some(package) } else { package.strip_prefix("closecall-") }
 }
 
-/// Returns the crates of the workspace.
-fn workspace() -> Vec<Crate> {
+/// Returns what cargo prints.
+fn cargo(arguments: &str) -> String {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.args(["metadata", "--no-deps", "--offline", "--format-version", "1"]).current_dir(ROOT);
-    let metadata: Value = serde_json::from_str(&stdout(&command.output().unwrap(), 0)).unwrap();
+    command.args(arguments.split(' ')).arg("--offline").current_dir(ROOT);
+    stdout(&command.output().unwrap(), 0)
+}
+
+/// Returns the crates of the workspace.
+fn workspace() -> Vec<Crate> {
+    let metadata: Value = serde_json::from_str(&cargo("metadata --no-deps --format-version 1")).unwrap();
     let packages = metadata["packages"].as_array().unwrap();
     packages
         .iter()
@@ -117,6 +123,20 @@ fn a_wrong_table_of_crates_is_found() {
     // A crate that the page lacks, one that does not exist, and one in another folder.
     assert_eq!(problems("| studies |", "| foreign |").len(), 3 + 2);
     assert_eq!(problems("| `studies` |", "| `campaign/studies` |").len(), 1);
+}
+
+/// A dependency of tests that switches a feature of a package makes `cargo test` build it again,
+/// and all that need it.
+#[test]
+fn the_tests_need_no_package_with_other_features_than_the_program() {
+    let packages = |edges: &str| -> BTreeSet<String> {
+        let tree = cargo(&format!("tree --workspace --prefix none --format {{p}},{{f}} --edges {edges}"));
+        tree.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect()
+    };
+    let (program, tests) = (packages("normal"), packages("normal,dev"));
+    let others: Vec<&String> = program.difference(&tests).collect();
+    assert!(others.is_empty(), "{others:#?}");
+    assert!(tests.iter().any(|package| package.starts_with("proptest ")));
 }
 
 /// The libraries. The command line, `src`, maps their messages to its options.
