@@ -75,9 +75,10 @@ impl Ahead {
         self.samples.iter()
     }
 
-    /// Keeps the samples for which `is_kept` holds.
-    pub(crate) fn retain(&mut self, is_kept: impl Fn(SampleKey, &Record) -> bool) {
-        self.samples.retain(|key, early| is_kept(*key, &early.finished.record));
+    /// Removes and returns the samples for which `is_taken` holds.
+    pub(crate) fn take_all(&mut self, is_taken: impl Fn(&Record) -> bool) -> BTreeMap<SampleKey, Record> {
+        let taken = self.samples.extract_if(.., |_, early| is_taken(&early.finished.record));
+        taken.map(|(key, early)| (key, early.finished.record)).collect()
     }
 
     /// Returns the numbers of the waiting samples of a scenario, which is given by its index.

@@ -22,6 +22,7 @@ use closecall_traffic::input::read_text;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::belief::Belief;
 use crate::compare::Regression;
 use crate::folder::{Folder, FolderError};
 use crate::folder_error::json_fault;
@@ -106,15 +107,14 @@ pub enum BaselineError {
 }
 
 impl Baseline {
-    /// Returns the results of the arm under test of a campaign.
+    /// Returns the results of the arm under test of a campaign. `max_flip_rate` is the share of
+    /// checked verdicts that may flip at half the time step (-).
     ///
     /// # Errors
-    /// [`FolderError`] if the folder cannot be read.
-    pub fn of(folder: &Folder) -> Result<Self, FolderError> {
+    /// [`FolderError`] if the folder cannot be read, or its results cannot be believed.
+    pub fn of(folder: &Folder, max_flip_rate: f64) -> Result<Self, FolderError> {
         let manifest = folder.manifest()?;
-        if let Some(part) = manifest.partition {
-            return Err(FolderError::Part { path: folder.path().to_owned(), part });
-        }
+        let mut belief = Belief::of(folder, max_flip_rate)?;
         let mut collected: BTreeMap<String, Collected> = manifest
             .scenarios
             .iter()
@@ -122,10 +122,12 @@ impl Baseline {
             .collect();
         for record in folder.complete_records()? {
             let record = record?;
+            belief.push(&record);
             if let (Some(scenario), Some(arm)) = (collected.get_mut(&record.scenario), record.arms.last()) {
                 scenario.push(record.sample, arm);
             }
         }
+        belief.check()?;
         let baseline = Self {
             content_blake3: String::new(),
             schema_version: BASELINE_VERSION,

@@ -7,9 +7,15 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use closecall_scenarios::ScenarioFile;
+use closecall_sensors::SensorMode;
+use toml::{Table, Value};
+
+use super::belief::Belief;
 use super::folder::{Folder, FolderError};
 use super::margins::{MARGINS, Margin, MarginRegression, cannot_regress, quantiles, regressions};
 use super::record::{ArmRecord, Record};
+use super::saved::scenario_files;
 
 /// The reason for which two campaigns cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -277,11 +283,17 @@ impl fmt::Display for Regression {
     }
 }
 
-/// Compares the arms under test of two campaigns.
+/// Compares the arms under test of two campaigns. `max_flip_rate` is the share of checked verdicts
+/// that may flip at half the time step (-).
 ///
 /// # Errors
-/// [`CompareError`] if a folder cannot be read, or the campaigns did not run the same samples.
-pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioComparison>, CompareError> {
+/// [`CompareError`] if a folder cannot be read, its results cannot be believed, or the campaigns did
+/// not run the same samples.
+pub fn compare(
+    baseline: &Folder,
+    current: &Folder,
+    max_flip_rate: f64,
+) -> Result<Vec<ScenarioComparison>, CompareError> {
     let different = |difference: String| CompareError::Different {
         baseline: baseline.path().to_owned(),
         current: current.path().to_owned(),
@@ -289,13 +301,31 @@ pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioCompar
     };
     let mut scenarios: Vec<ScenarioComparison> = Vec::new();
     let (mut earlier, mut later) = (baseline.complete_records()?, current.complete_records()?);
+    let mut beliefs = [Belief::of(baseline, max_flip_rate)?, Belief::of(current, max_flip_rate)?];
+    // Without errors of perception fewer samples fail.
+    let [before, after] = [baseline.manifest()?.sensors, current.manifest()?.sensors];
+    if before != after {
+        let named = |mode: Option<SensorMode>| mode.map_or("the sensors of the scenario", SensorMode::name);
+        return Err(different(format!("the first ran with {}, the second with {}", named(before), named(after))));
+    }
+    let [earlier_files, later_files] = [files(baseline)?, files(current)?];
+    for (before, after) in earlier_files.iter().flat_map(|one| later_files.iter().map(move |other| (one, other))) {
+        let (name, keys) = (&before.config().name, other_encounter(before, after));
+        if *name == after.config().name && !keys.is_empty() {
+            return Err(different(format!("the scenario `{name}` differs in {}", keys.join(", "))));
+        }
+    }
     loop {
         let (before, after) = match (earlier.next().transpose()?, later.next().transpose()?) {
-            (None, None) => return Ok(scenarios),
+            (None, None) => {
+                beliefs.into_iter().try_for_each(Belief::check)?;
+                return Ok(scenarios);
+            }
             (Some(before), Some(after)) => (before, after),
             (Some(more), None) => return Err(different(format!("only the first has {}", named(&more)))),
             (None, Some(more)) => return Err(different(format!("only the second has {}", named(&more)))),
         };
+        beliefs.iter_mut().zip([&before, &after]).for_each(|(belief, record)| belief.push(record));
         if (&before.scenario, before.sample) != (&after.scenario, after.sample) {
             let (first, second) = (named(&before), named(&after));
             return Err(different(format!("the first has {first}, the second has {second} in its place")));
@@ -316,6 +346,28 @@ pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioCompar
             scenario.push(before.sample, old, new);
         }
     }
+}
+
+fn files(folder: &Folder) -> Result<Vec<ScenarioFile>, FolderError> {
+    scenario_files(folder.path(), &folder.manifest()?).map_err(|error| folder.of_manifest(error))
+}
+
+/// The keys of a scenario that say what happens to the ego. Its parameters are compared as drawn.
+const ENCOUNTER: [&str; 8] =
+    ["duration-s", "road", "environment", "actor", "traffic", "random-numbers", "ideal", "fault"];
+
+/// Returns the keys in which two scenarios are another encounter. The settings of the ego stack do
+/// not count: they belong to the system under test, as controller and perception do.
+fn other_encounter(before: &ScenarioFile, after: &ScenarioFile) -> Vec<&'static str> {
+    let [before, after] = [before, after].map(|file| {
+        let mut table = Table::try_from(file.config()).unwrap_or_default();
+        let actors = table.get_mut("actor").and_then(Value::as_array_mut).into_iter().flatten();
+        for driver in actors.filter_map(|actor| actor.get_mut("driver")?.as_table_mut()) {
+            driver.remove("ego-stack");
+        }
+        table
+    });
+    ENCOUNTER.into_iter().filter(|key| before.get(*key) != after.get(*key)).collect()
 }
 
 fn named(record: &Record) -> String {

@@ -222,8 +222,9 @@ impl Campaign {
             }
         }
         let is_retried = |record: &Record| self.retry_errors && record.arms.iter().any(ArmRecord::is_incomplete);
-        ahead.retain(|_, record| !is_retried(record));
         wanted.retain(|key| !ahead.contains(*key));
+        let failed = ahead.take_all(is_retried);
+        wanted.extend(failed.keys());
         let mut ends = |key: &SampleKey, record: &Record| on_record(NextRecord::read(key.work, record)).is_break();
         let is_over = ahead.entries().any(|(key, early)| ends(key, &early.finished.record));
         if is_over {
@@ -240,14 +241,15 @@ impl Campaign {
             if samples.is_empty() {
                 continue;
             }
-            self.run_samples(number, work, samples.into_iter(), |finished| {
+            self.run_samples(number, work, samples.into_iter(), |mut finished| {
+                let key = SampleKey { work: number, sample: finished.record.sample };
+                failed.get(&key).iter().for_each(|failed| finished.record.follow(failed));
                 // Without its line, the sample runs again if the campaign is interrupted.
                 match file.as_mut().map_or(Ok(()), |file| file.append(&finished)) {
                     Err(_) if self.goes_on_without_folder => file = None,
                     written => written?,
                 }
                 ahead.is_over = on_record(NextRecord::finished(number, &finished)).is_break();
-                let key = SampleKey { work: number, sample: finished.record.sample };
                 ahead.insert(key, EarlySample { finished, is_new: true });
                 Ok(if ahead.is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;

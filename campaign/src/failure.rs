@@ -19,7 +19,8 @@ pub enum FailureKind {
     InvalidInput,
     /// A sample has no outcome.
     Sample,
-    /// The program, a file or a controller differs from the start of the campaign.
+    /// The program, a file or a controller differs from the start of the campaign, or its results
+    /// cannot be believed.
     Validity,
     /// A file or folder cannot be read or written.
     Io,
@@ -67,6 +68,7 @@ impl From<&FolderError> for FailureKind {
             | FolderError::Part { .. }
             | FolderError::Foreign { .. } => Self::Usage,
             FolderError::Content { .. } | FolderError::Incomplete { .. } => Self::InvalidInput,
+            FolderError::Invalid { .. } => Self::Validity,
         }
     }
 }

@@ -32,7 +32,7 @@ use super::journal_plan::JournalPlan;
 use super::lock::{LOCK, Lock};
 use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::rare;
-use super::record::Record;
+use super::record::{Agreement, Record};
 use super::saved_error::SavedError;
 use super::trust;
 use super::wall_times::{self, WallTime, WallTimes};
@@ -94,17 +94,6 @@ pub struct Folder {
     path: PathBuf,
 }
 
-/// How an outcome compares with the outcome in the journal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Agreement {
-    /// Every bit is the same.
-    Same,
-    /// Some bit differs, or the journal has an error.
-    Differs,
-    /// The journal has no result of this sample in this arm.
-    NotCompared,
-}
-
 /// A campaign's folder that this program has locked, so that it can run a campaign in it.
 #[derive(Debug)]
 pub struct LockedFolder {
@@ -131,6 +120,15 @@ pub struct TornLine {
     pub line: usize,
     /// What is wrong with it.
     pub reason: String,
+}
+
+/// Says that a run of a sample is not the run of the campaign.
+pub fn difference(outcome: &Outcome) -> String {
+    let (sample, controller) = (outcome.sample, &outcome.controller);
+    format!(
+        "sample {sample} with `{controller}` differs from the campaign's journal: the controller, a file that it imports or the \
+         program has changed, or does not repeat"
+    )
 }
 
 impl Folder {
@@ -354,11 +352,15 @@ impl Folder {
 
     /// Returns the plan of the manifest, which the journal follows.
     pub(crate) fn plan(&self) -> Result<JournalPlan, FolderError> {
-        let path = self.file(MANIFEST);
-        JournalPlan::new(&self.path, &self.manifest()?).map_err(|error| match error {
+        JournalPlan::new(&self.path, &self.manifest()?).map_err(|error| self.of_manifest(error))
+    }
+
+    /// Returns the error of a manifest whose campaign cannot be read back.
+    pub(crate) fn of_manifest(&self, error: SavedError) -> FolderError {
+        match error {
             SavedError::Folder(error) => error,
-            other => FolderError::Content { path, line: 1, message: other.to_string() },
-        })
+            other => FolderError::Content { path: self.file(MANIFEST), line: 1, message: other.to_string() },
+        }
     }
 
     /// Returns how the journal's result of this sample compares with an outcome, to the last bit.
@@ -370,13 +372,10 @@ impl Folder {
             return Ok(Agreement::NotCompared);
         }
         for record in self.records()? {
-            let record = record?;
-            if record.scenario != outcome.scenario || record.sample != outcome.sample {
-                continue;
+            let agreement = record?.agreement(outcome);
+            if agreement != Agreement::NotCompared {
+                return Ok(agreement);
             }
-            let Some(arm) = record.arms.iter().find(|arm| arm.controller == outcome.controller) else { break };
-            let is_same = arm.result.as_ref().is_ok_and(|kept| kept.has_same_bits(outcome));
-            return Ok(if is_same { Agreement::Same } else { Agreement::Differs });
         }
         Ok(Agreement::NotCompared)
     }

@@ -114,6 +114,14 @@ pub enum FolderError {
         /// Number of samples of the plan.
         planned: u64,
     },
+    /// The results cannot be believed.
+    #[error("failed to use {}: the results of its campaign are INVALID:\n  {}", path.display(), listed(reasons))]
+    Invalid {
+        /// The folder.
+        path: PathBuf,
+        /// Why, one message for each reason.
+        reasons: Vec<String>,
+    },
     /// A file of the folder is damaged, or does not belong to the campaign.
     #[error("failed to read {}:{line}: {message}", path.display())]
     Content {

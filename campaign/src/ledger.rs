@@ -146,8 +146,8 @@ pub struct ArmCounts {
     pub imposed: u64,
     /// Samples that ended in an error.
     pub errors: u64,
-    /// Samples with an outcome only because they were run again after their process had crashed or
-    /// hung (`--retry-crashed`).
+    /// Samples with an outcome only because they were run again after a failure (`--retry-crashed`,
+    /// `--retry-errors`).
     pub flaky: u64,
     /// Runs for whose validity checks there is a result.
     pub checked: u64,
@@ -179,8 +179,7 @@ pub struct ArmCounts {
 pub struct Tally {
     /// Whether the ego collides, as judged; `None` if the sample ended in an error.
     pub collided: Option<bool>,
-    /// Whether it has an outcome only because it was run again after its process had crashed or
-    /// hung.
+    /// Whether it has an outcome only because it was run again after a failure.
     pub flaky: bool,
     /// Whether two vehicles other than the ego collide with each other.
     pub others_collided: bool,

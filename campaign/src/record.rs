@@ -6,8 +6,19 @@ use closecall_simulation::SampleError;
 use serde::{Deserialize, Serialize};
 
 use super::ledger::{Cost, Tally};
-use super::validity::ArmChecks;
+use super::validity::{ArmChecks, Invariance};
 use closecall_scenarios::harm::harm;
+
+/// How an outcome compares with the outcome in the journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Agreement {
+    /// Every bit is the same.
+    Same,
+    /// Some bit differs, or the journal has an error.
+    Differs,
+    /// The journal has no result of this sample in this arm.
+    NotCompared,
+}
 
 /// The reason for which a sample has no outcome.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,11 +35,11 @@ impl From<SampleError> for SampleFailure {
     }
 }
 
-/// What happened before the run of a sample that has been run again because its process crashed or
-/// hung.
+/// What happened before the run of a sample that has been run again, because its process crashed or
+/// hung, or because it had ended in an error.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Flaky {
-    /// Number of runs that crashed or hung.
+    /// Number of runs that failed.
     pub crashes: u32,
     /// The first failure.
     pub first: SampleFailure,
@@ -89,7 +100,8 @@ pub struct ArmRecord {
     /// The runs in which nobody comes from behind; `None` if this sample was not chosen for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nobody_behind: Option<NobodyComing>,
-    /// The crashes before this outcome, if a repeated run has it (`--retry-crashed`).
+    /// The failures before this outcome, if a repeated run has it (`--retry-crashed`,
+    /// `--retry-errors`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flaky: Option<Flaky>,
 }
@@ -108,6 +120,31 @@ impl ArmRecord {
         self.result.is_err()
             || self.checks.as_ref().is_some_and(|checks| checks.not_checked.is_some())
             || self.nobody_behind.is_some_and(|nobody_behind| nobody_behind.is_late)
+    }
+
+    /// Notes an earlier run of the sample in the same arm, whose place this run takes. An outcome
+    /// after a failure is flaky. Two outcomes are the same, or the run does not repeat.
+    fn follow(&mut self, earlier: &Self) {
+        let before = earlier.flaky.clone();
+        match (&earlier.result, &self.result) {
+            (Err(failure), Ok(_)) => {
+                let crashes = [&earlier.flaky, &self.flaky].into_iter().flatten().map(|flaky| flaky.crashes);
+                let first = before.map_or_else(|| failure.clone(), |flaky| flaky.first);
+                self.flaky = Some(Flaky { crashes: 1 + crashes.sum::<u32>(), first });
+            }
+            (Err(failure), Err(_)) => {
+                let first = before.unwrap_or_else(|| Flaky { crashes: 0, first: failure.clone() });
+                self.flaky = Some(Flaky { crashes: first.crashes + 1, ..first });
+            }
+            (Ok(outcome), Ok(again)) => {
+                self.flaky = before.or(self.flaky.take());
+                if !again.has_same_bits(outcome) {
+                    let broken = &mut self.checks.get_or_insert_default().broken;
+                    broken.extend((!broken.contains(&Invariance::Repetition)).then_some(Invariance::Repetition));
+                }
+            }
+            (Ok(_), Err(_)) => {}
+        }
     }
 
     /// Returns the contribution of this arm to the counts, before the validity checks are taken
@@ -154,6 +191,23 @@ pub struct Record {
 }
 
 impl Record {
+    /// Notes an earlier run of the same sample, whose place this run takes.
+    pub(crate) fn follow(&mut self, earlier: &Self) {
+        self.arms.iter_mut().zip(&earlier.arms).for_each(|(arm, earlier)| arm.follow(earlier));
+    }
+
+    /// Returns how the result of this sample compares with an outcome, to the last bit. An outcome of
+    /// another sample is not compared.
+    pub fn agreement(&self, outcome: &Outcome) -> Agreement {
+        let is_same = self.scenario == outcome.scenario && self.sample == outcome.sample;
+        let arm = self.arms.iter().find(|arm| is_same && arm.controller == outcome.controller);
+        match arm.map(|arm| arm.result.as_ref()) {
+            None => Agreement::NotCompared,
+            Some(Ok(kept)) if kept.has_same_bits(outcome) => Agreement::Same,
+            Some(_) => Agreement::Differs,
+        }
+    }
+
     /// Returns true if a validity check other than a flipped verdict failed in any arm.
     pub fn is_invalid(&self) -> bool {
         self.arms.iter().filter_map(|arm| arm.checks.as_ref()).any(|checks| !checks.broken.is_empty())

@@ -40,10 +40,12 @@ pub(super) struct Repair {
 type Key = (usize, u64);
 
 /// A part of a journal that is replaced.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug)]
 struct Redo {
     bytes: Range<u64>,
     samples: Vec<Key>,
+    /// The record of the only sample, if it is intact and incomplete.
+    failed: Option<Box<Record>>,
     /// The damaged lines; empty if the part is an intact record of an error, or a repeated line.
     damaged: Vec<TornLine>,
 }
@@ -104,11 +106,11 @@ fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
         if copies.contains(&number) {
             // Between damaged lines, a copy is replaced with them.
             if damaged.is_empty() {
-                redos.push(Redo { bytes: start..end, samples: Vec::new(), damaged: Vec::new() });
+                redos.push(Redo { bytes: start..end, samples: Vec::new(), failed: None, damaged: Vec::new() });
             }
             continue;
         }
-        let record = match journal::parse(&buffer) {
+        let record: Box<Record> = match journal::parse(&buffer) {
             Ok(record) => record,
             Err(reason) => {
                 if damaged.is_empty() {
@@ -121,12 +123,13 @@ fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
         let Some(key) = key_of(campaign, &record) else { break };
         if !damaged.is_empty() {
             let Some(samples) = between(campaign, last, key) else { break };
-            redos.push(Redo { bytes: damaged_from..start, samples, damaged: std::mem::take(&mut damaged) });
+            let damaged = std::mem::take(&mut damaged);
+            redos.push(Redo { bytes: damaged_from..start, samples, failed: None, damaged });
         } else if let Some(grown) = grown(campaign, last, key) {
-            redos.push(Redo { bytes: start..start, samples: grown, damaged: Vec::new() });
+            redos.push(Redo { bytes: start..start, samples: grown, failed: None, damaged: Vec::new() });
         }
         if campaign.retry_errors && record.arms.iter().any(ArmRecord::is_incomplete) {
-            redos.push(Redo { bytes: start..end, samples: vec![key], damaged: Vec::new() });
+            redos.push(Redo { bytes: start..end, samples: vec![key], failed: Some(record), damaged: Vec::new() });
         }
         last = Some(key);
     }
@@ -165,14 +168,18 @@ fn grown(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<Key
     (last.0 < before.0 && samples.iter().all(is_of_last)).then_some(samples)
 }
 
-/// Runs the samples of all parts again.
+/// Runs the samples of all parts again. A sample that had ended in an error keeps a note of it.
 fn run_again(campaign: &Campaign, redos: &[Redo]) -> Result<BTreeMap<Key, Finished>, CampaignError> {
     let mut results = BTreeMap::new();
+    let failed = redos.iter().filter_map(|redo| Some((*redo.samples.first()?, redo.failed.as_deref()?)));
+    let failed: BTreeMap<Key, &Record> = failed.collect();
     for (index, work) in campaign.works.iter().enumerate() {
         let keys = redos.iter().flat_map(|redo| &redo.samples).filter(|(work, _)| *work == index);
         let samples: Vec<u64> = keys.map(|(_, sample)| *sample).collect();
-        campaign.run_samples(index, work, samples.into_iter(), |finished| {
-            results.insert((index, finished.record.sample), finished);
+        campaign.run_samples(index, work, samples.into_iter(), |mut finished| {
+            let key = (index, finished.record.sample);
+            failed.get(&key).iter().for_each(|failed| finished.record.follow(failed));
+            results.insert(key, finished);
             Ok(ControlFlow::Continue(()))
         })?;
     }

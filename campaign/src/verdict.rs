@@ -227,8 +227,7 @@ impl From<&GateSet> for Allowed {
 /// The number of flaky samples, and the gate on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct FlakyGate {
-    /// Samples with an outcome only because they were run again after their process had crashed or
-    /// hung.
+    /// Samples with an outcome only because they were run again after a failure.
     pub flaky: u64,
     /// Most such samples.
     pub max: u64,
@@ -370,7 +369,7 @@ fn judge_flaky(total: &Counts, max: Option<u64>, findings: &mut Findings) -> Opt
     let (flaky, runs) = (total.flaky(), total.arms.iter().map(|arm| arm.outcomes).sum::<u64>());
     let Some(gate) = max.map(|max| FlakyGate { flaky, max }) else {
         if flaky > 0 {
-            findings.note(format!("flaky: {} succeeded only in another process", samples(flaky)));
+            findings.note(format!("flaky: {} succeeded only when run again", samples(flaky)));
         }
         return None;
     };
@@ -389,6 +388,16 @@ fn judge_flaky(total: &Counts, max: Option<u64>, findings: &mut Findings) -> Opt
     Some(gate)
 }
 
+/// Returns why the samples cannot be believed, in sentences: what the validity checks found, and what
+/// scenarios are about and did not happen.
+pub(crate) fn disbelief(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Vec<String> {
+    let mut findings = Findings::default();
+    judge_validity(summary, &summary.total().checks, max_flip_rate, &mut findings);
+    judge_expectations(judge, &mut findings);
+    let is_decisive = |reason: &Reason| reason.decision == Some(Decision::Invalid);
+    findings.reasons.into_iter().filter(is_decisive).map(|reason| reason.text).collect()
+}
+
 fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, findings: &mut Findings) {
     if checks.not_checked > 0 {
         let sentence = format!(
@@ -401,7 +410,7 @@ fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, f
         // The checks of the other arms and scenarios say nothing of these.
         match &without_check(summary)[..] {
             [] => findings.note(sentence),
-            runs => findings.add(Decision::Inconclusive, format!("{sentence}: none of {}", runs.join(", "))),
+            runs => findings.add(Decision::Inconclusive, format!("{sentence}: most of {}", runs.join(", "))),
         }
     }
     for (check, count) in checks.broken() {
@@ -425,12 +434,12 @@ fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, f
     if checks.flips > allowed { findings.add(Decision::Invalid, sentence) } else { findings.note(sentence) }
 }
 
-/// Returns the scenarios and arms that have no result among the runs chosen for the validity checks,
-/// in words.
+/// Returns the scenarios and arms of which most runs that were chosen for the validity checks have no
+/// result, in words.
 fn without_check(summary: &Summary) -> Vec<String> {
     let arms = |(name, counts): &(String, Counts)| -> Vec<String> {
         let arms = counts.arms.iter().zip(&summary.controllers);
-        let unchecked = arms.filter(|(counts, _)| counts.not_checked > 0 && counts.checked == 0);
+        let unchecked = arms.filter(|(counts, _)| counts.not_checked > counts.checked);
         unchecked.map(|(_, controller)| format!("{name} with {controller}")).collect()
     };
     summary.scenarios.iter().flat_map(arms).collect()

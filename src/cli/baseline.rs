@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use closecall_campaign::arguments::share;
 use closecall_campaign::baseline::Baseline;
 use closecall_campaign::folder::Folder;
+use closecall_campaign::gate::MAX_FLIP_RATE;
 use closecall_report::campaign::BaselineText;
 use closecall_report::json::stamped;
 use closecall_traffic::atomic::WriteError;
@@ -44,6 +45,10 @@ enum Action {
         dir: PathBuf,
         /// File to write; an existing baseline is replaced
         file: PathBuf,
+        /// Share (0 to 1) of the checked verdicts of a campaign that may flip at half the time step. With
+        /// more, the campaign is INVALID
+        #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE, help_heading = heading::GATES)]
+        max_flip_rate: f64,
     },
     /// Name what newly fails, what is fixed, and which margins shrank since the baseline was saved.
     /// The exit code of a regression is 1
@@ -60,6 +65,10 @@ enum Action {
         /// Share (0 to 1) by which a quantile of a margin may fall
         #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, help_heading = heading::GATES)]
         tolerance: f64,
+        /// Share (0 to 1) of the checked verdicts of a campaign that may flip at half the time step. With
+        /// more, the campaign is INVALID
+        #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE, help_heading = heading::GATES)]
+        max_flip_rate: f64,
         /// Output format
         #[arg(long, value_enum, default_value_t, help_heading = heading::OUTPUT)]
         format: Format,
@@ -68,17 +77,20 @@ enum Action {
 
 pub(super) fn baseline(args: &BaselineArgs) -> Result<ExitCode, CliError> {
     match &args.action {
-        Action::Save { dir, file } => save(dir, file),
-        Action::Compare { dir, file, tolerance, format } => compare(dir, file, *tolerance, *format),
+        Action::Save { dir, file, max_flip_rate } => save(dir, file, *max_flip_rate),
+        Action::Compare { dir, file, tolerance, max_flip_rate, format } => {
+            let compared = [Baseline::read(file)?, Baseline::of(&Folder::open(dir), *max_flip_rate)?];
+            compare(&compared, *tolerance, file, *format)
+        }
     }
 }
 
-fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
+fn save(dir: &Path, file: &Path, max_flip_rate: f64) -> Result<ExitCode, CliError> {
     // Only a baseline is replaced: another file may be an input.
     if file.try_exists().map_err(|source| WriteError::new(file, source))? {
         Baseline::read(file)?;
     }
-    let baseline = Baseline::of(&Folder::open(dir))?;
+    let baseline = Baseline::of(&Folder::open(dir), max_flip_rate)?;
     baseline.write(file)?;
     for (name, scenario) in &baseline.scenarios {
         let samples = counted(scenario.samples, "sample");
@@ -89,9 +101,13 @@ fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<ExitCode, CliError> {
-    let (before, current) = (Baseline::read(file)?, Baseline::of(&Folder::open(dir))?);
-    let comparison = before.compare(&current, tolerance)?;
+fn compare(
+    [before, current]: &[Baseline; 2],
+    tolerance: f64,
+    file: &Path,
+    format: Format,
+) -> Result<ExitCode, CliError> {
+    let comparison = before.compare(current, tolerance)?;
     let regression = comparison.regression();
     let code = ExitCode::from(regression);
     match format {

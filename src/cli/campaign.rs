@@ -556,6 +556,9 @@ pub(super) enum Conclusion<'a> {
     Early(EndedEarly<'a>),
     /// It is judged.
     Judged(Judged<'a>),
+    /// A recorded run is not the run of the campaign, so that the judgement is another one: the same
+    /// for programs. The console has it in a line of its own.
+    Corrected(Value),
 }
 
 /// A campaign that is judged.
@@ -576,24 +579,29 @@ impl Conclusion<'_> {
     pub(super) fn json(&self) -> Value {
         match self {
             Self::Early(ended) => ended.json(),
-            Self::Judged(judged) => {
-                let mut value = json::campaign_report(judged.report, Some(judged.wall_s));
-                if let (Some((key, more)), Some(object)) = (judged.companion.json(), value.as_object_mut()) {
-                    object.insert(key.to_owned(), more);
-                }
-                value
-            }
+            Self::Judged(judged) => report_json(judged.report, judged.companion, judged.wall_s),
+            Self::Corrected(value) => value.clone(),
         }
     }
 
     /// Prints it.
     pub(super) fn print(&self, format: Format) {
         match (format, self) {
+            (_, Self::Corrected(_)) => {}
             (Format::Json, conclusion) => outln!("{:#}", conclusion.json()),
             (Format::Human, Self::Early(ended)) => print_text(format_args!("{}{ended}", CountsText(ended.summary))),
             (Format::Human, Self::Judged(judged)) => judged.print(),
         }
     }
+}
+
+/// Returns the report of a campaign for programs, with what the command keeps beside it.
+fn report_json(report: &CampaignReport<'_>, companion: &dyn Companion, wall_s: f64) -> Value {
+    let mut value = json::campaign_report(report, Some(wall_s));
+    if let (Some((key, more)), Some(object)) = (companion.json(), value.as_object_mut()) {
+        object.insert(key.to_owned(), more);
+    }
+    value
 }
 
 /// Returns the simulated time and the wall time of the samples that have just been run (s), where
@@ -713,6 +721,12 @@ pub(super) fn carry_out(
         None => report.write_without_folder(),
     };
     let code = planned.artifacts.code(companion.code((&judged).into()), &written);
+    if !written.differences.is_empty() {
+        judged.add_invalid(written.differences.clone());
+        let report =
+            CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged, command_for };
+        tell(&Conclusion::Corrected(report_json(&report, companion, wall_s)));
+    }
     if let Some(folder) = results.complete() {
         print_results(folder, &written.recorded);
     }

@@ -6,6 +6,7 @@ use clap::Args;
 use closecall_campaign::arguments::share;
 use closecall_campaign::compare::{Regression, compare as compare_folders};
 use closecall_campaign::folder::Folder;
+use closecall_campaign::gate::MAX_FLIP_RATE;
 use closecall_report::campaign::ComparisonText;
 use closecall_report::json::{self, stamped};
 
@@ -34,6 +35,10 @@ pub(super) struct CompareArgs {
     /// Share (0 to 1) by which a quantile of a margin may fall
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, help_heading = heading::GATES)]
     tolerance: f64,
+    /// Share (0 to 1) of the checked verdicts of a campaign that may flip at half the time step. With
+    /// more, the campaign is INVALID
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE, help_heading = heading::GATES)]
+    max_flip_rate: f64,
     #[command(flatten)]
     search: SearchArgs,
     /// Output format
@@ -48,7 +53,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let (baseline, current) = (Folder::open(&args.baseline), Folder::open(&args.dir));
     let (baseline_manifest, current_manifest) = (baseline.manifest()?, current.manifest()?);
     let differences = baseline_manifest.differences(&current_manifest);
-    let scenarios = compare_folders(&baseline, &current)?;
+    let scenarios = compare_folders(&baseline, &current, args.max_flip_rate)?;
     let regression = Regression::of(&scenarios, args.max_newly_failing, args.tolerance);
     let code = ExitCode::from(regression);
     match args.format {

@@ -42,7 +42,7 @@ pub(super) struct SearchArgs {
     /// Look beyond the samples of both campaigns for one in which the ego collides with the
     /// controller of the later campaign, and not with the controller of the earlier one. The first
     /// is reduced to the smallest case. The exit code is 1 if there is one
-    #[arg(long, conflicts_with_all = ["max_newly_failing", "tolerance"], help_heading = heading::METHOD)]
+    #[arg(long, conflicts_with_all = ["max_newly_failing", "tolerance", "max_flip_rate"], help_heading = heading::METHOD)]
     search: bool,
     /// With --search: largest number of runs of each scenario [default: 2000]
     #[arg(short = 'n', long, value_name = "N", value_parser = count, requires = "search", help_heading = heading::SAMPLES)]

@@ -29,7 +29,8 @@ pub(super) struct EndArgs {
     /// End as soon as more than N samples have ended in an error. There is then no verdict
     #[arg(long, value_name = "N", help_heading = heading::EXECUTION)]
     max_errors: Option<u64>,
-    /// With --resume: run the samples that ended in an error again
+    /// With --resume: run the samples that ended in an error again. A sample that succeeds only then
+    /// is flaky; --max-flaky limits their number
     #[arg(long, help_heading = heading::EXECUTION)]
     pub(super) retry_errors: bool,
 }

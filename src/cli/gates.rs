@@ -71,8 +71,8 @@ pub(super) struct GateArgs {
     /// half the time step [default: 0.05]
     #[arg(long, value_name = "SHARE", help_heading = heading::GATES)]
     pub(super) max_flip_rate: Option<Share>,
-    /// Fail if more than K samples are flaky: they crashed or hung, and have an outcome only
-    /// because of --retry-crashed [default: any number; 0 with --preset]
+    /// Fail if more than K samples are flaky: they failed, and have an outcome only because of
+    /// --retry-crashed or --retry-errors [default: any number; 0 with --preset]
     #[arg(long, value_name = "K", help_heading = heading::GATES)]
     max_flaky: Option<u64>,
 }

@@ -2,8 +2,8 @@
 //! unless settings change it.
 
 use clap::Args;
-use closecall_campaign::folder::Agreement;
 use closecall_campaign::manifest::{Manifest, version};
+use closecall_campaign::record::Agreement;
 
 use super::CliError;
 use super::args::{Format, SavedSampleArgs, SetArgs};

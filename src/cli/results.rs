@@ -16,6 +16,7 @@ use closecall_campaign::rare::RareManifest;
 use closecall_campaign::results::{Moved, RESULTS, Unfinished, check_inputs, resume, take};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::Selection;
+use closecall_campaign::verdict::Verdict;
 use closecall_report::campaign::{RecordedSample, Written};
 use closecall_report::run::rerun::is_recording_enabled;
 use closecall_traffic::atomic::WriteError;
@@ -122,9 +123,14 @@ impl ArtifactArgs {
         self.strict_artifacts
     }
 
-    /// Prints a warning for each report or recording that could not be written. Returns the exit
-    /// code. `verdict` is the code of the verdict.
+    /// Prints a warning for each report or recording that could not be written, and each recorded run
+    /// that is not the run of the campaign. Returns the exit code. `verdict` is the code of the
+    /// verdict.
     pub(super) fn code(self, verdict: ExitCode, written: &Written) -> ExitCode {
+        for difference in &written.differences {
+            print_error(format_args!("{}: {difference}\n", Verdict::Invalid));
+        }
+        let verdict = ExitCode::first_of(written.differences.iter().map(|_| ExitCode::Invalid).chain([verdict]));
         for failure in &written.failures {
             warn(failure);
         }

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use clap::Args;
 use closecall_campaign::arguments::{MemoryMib, TimeoutMs};
-use closecall_campaign::folder::Agreement;
+use closecall_campaign::folder::difference;
 use closecall_campaign::rare::RareManifest;
+use closecall_campaign::record::Agreement;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::outcome::Outcome;
 use serde::Deserialize;
@@ -57,11 +58,7 @@ pub(super) fn difference_from_journal<'a>(
 ) -> Result<Option<String>, CliError> {
     for outcome in outcomes {
         if saved.folder().agreement(outcome)? == Agreement::Differs {
-            let (sample, controller) = (outcome.sample, &outcome.controller);
-            return Ok(Some(format!(
-                "sample {sample} with `{controller}` differs from the campaign's journal: the controller, a file that it imports or \
-                 the program has changed, or does not repeat"
-            )));
+            return Ok(Some(difference(outcome)));
         }
     }
     Ok(None)

@@ -85,7 +85,7 @@ fn the_bytes_are_the_same_with_any_number_of_threads_resumed_and_merged() {
         stdout(&closecall(["replay", out, "3", "--controller", controller]), 0);
     }
     stdout(&closecall(["replay", out, "3", "--paired"]), 0);
-    let compared = stdout(&closecall(["compare", first, first]), 0);
+    let compared = stdout(&closecall(["compare", out, out]), 0);
     assert!(compared.contains("NO REGRESSION"), "{compared}");
 }
 

@@ -89,6 +89,36 @@ fn a_replay_does_not_say_that_nothing_has_changed_if_a_file_that_the_controller_
 }
 
 #[test]
+fn a_campaign_whose_controller_changed_is_no_baseline_and_is_not_compared() {
+    let folder = folder();
+    let script = folder.path().join("own.sh");
+    let run = |out: &str, expected: i32| {
+        let words = "campaign overtake-without-brake -n 6 --sensors ground-truth --no-gate --record failures:0 --jobs 1 \
+                     --set duration-s=2 --set expects=[] --no-validity-checks --controller-timeout-ms 60000 --out";
+        let mut command = program();
+        command.current_dir(folder.path()).args(words.split(' ')).args([out, "--controller", "exec:sh own.sh"]);
+        stdout(&command.output().unwrap(), expected)
+    };
+    let closecall = |words: &str| program().current_dir(folder.path()).args(words.split(' ')).output().unwrap();
+    fs::write(&script, STEADY).unwrap();
+    run("good", 0);
+    stdout(&closecall("baseline save good good.json"), 0);
+    // Some run of the campaign changes it.
+    let changes = "n=$(cat count 2>/dev/null || echo 0)\necho $((n + 1)) > count\n\
+                   [ $n -ge 4 ] && [ ! -e edited ] && { : > edited; echo '# more' >> own.sh; }\n";
+    fs::write(&script, format!("{changes}{STEADY}")).unwrap();
+    run("bad", 7);
+    for words in
+        ["baseline save bad bad.json", "baseline compare bad good.json", "compare good bad", "compare bad good"]
+    {
+        let output = closecall(words);
+        assert_eq!(code(&output), 7, "{words}: {}", stderr(&output));
+        assert!(message(&output).contains("the controller changed during the campaign"), "{}", stderr(&output));
+    }
+    assert!(!folder.path().join("bad.json").exists());
+}
+
+#[test]
 fn a_controller_that_changes_while_a_rare_event_is_sampled_makes_the_estimate_invalid() {
     let folder = folder();
     let script = folder.path().join("own.sh");

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::native_controllers::{compile, lib};
+use crate::native_controllers::{compile, lib, with_fault};
 use crate::support::{ROOT, closecall, code, folder, json, library, message, program, records, stderr, stdout};
 
 fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
@@ -70,6 +70,23 @@ fn a_campaign_is_no_regression_against_itself() {
 }
 
 #[test]
+fn a_campaign_whose_runs_do_not_repeat_is_no_baseline_and_is_not_compared() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let [out, baseline] = ["out", "baseline.json"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let mut command = program();
+    let words = "campaign overtake-without-brake -n 4 --sensors object --no-gate --record failures:0 --controller";
+    command.args(words.split(' ')).args([&library, "--out", &out]);
+    assert_eq!(code(&with_fault(&mut command, Some("process-number"))), 7);
+    for words in [["baseline", "save", &out, &baseline], ["compare", &out, &out, "--format=json"]] {
+        let output = closecall(words);
+        assert_eq!(code(&output), 7, "{}", stderr(&output));
+        assert!(message(&output).contains("the same run gave another outcome when repeated"), "{}", stderr(&output));
+    }
+    assert!(!Path::new(&baseline).exists());
+}
+
+#[test]
 fn a_margin_that_shrinks_is_a_regression_even_without_a_collision() {
     let folder = folder();
     let scenario = library("overtake-without-brake");
@@ -97,14 +114,30 @@ fn a_margin_that_shrinks_is_a_regression_even_without_a_collision() {
 #[test]
 fn campaigns_with_different_samples_are_not_compared() {
     let folder = folder();
-    let first = campaign(folder.path().join("one"), &["-n", "12"]);
-    let longer = campaign(folder.path().join("longer"), &["-n", "13"]);
-    let other = campaign(folder.path().join("other"), &["-n", "12", "--set", "brake-mps2=6"]);
-    for (dir, named) in [(&longer, "only the second has sample 12"), (&other, "brake-mps2")] {
+    let run = |name: &str, words: &str| {
+        campaign(folder.path().join(name), &words.split(' ').chain(["--check-at-most", "0"]).collect::<Vec<_>>())
+    };
+    let first = run("one", "-n 12 --sensors object");
+    let longer = run("longer", "-n 13 --sensors object");
+    let other = run("other", "-n 12 --sensors object --set brake-mps2=6");
+    let part = run("part", "-n 12 --sensors object --partition 1/2");
+    let wet = run("wet", "-n 12 --sensors object --set environment.friction=0.5");
+    let fast = run("fast", "-n 12 --sensors ground-truth");
+    let differing = [
+        (&longer, "only the second has sample 12"),
+        (&other, "brake-mps2"),
+        (&part, "holds only part 1/2"),
+        (&wet, "differs in environment"),
+        (&fast, "the second with ground-truth"),
+    ];
+    for (dir, named) in differing {
         let refused = compare(&first, dir, &[]);
         assert_eq!(code(&refused), 2);
-        assert!(stderr(&refused).contains(named), "{}", stderr(&refused));
+        assert!(message(&refused).contains(named), "{}", stderr(&refused));
     }
+    // The settings of the system under test may differ.
+    let gentle = run("gentle", "-n 12 --sensors object --set actor.ego.driver.ego-stack.mis.max-deceleration-mps2=0.9");
+    assert_ne!(code(&compare(&first, &gentle, &["--tolerance", "1"])), 2);
     assert_eq!(code(&compare(&first, &folder.path().join("nothing"), &[])), 6);
 }
 
@@ -152,7 +185,8 @@ fn errors_decide_about_a_comparison_with_a_baseline_and_hide_neither_a_fix_nor_a
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let run = |name: &str, controller: &str, expected: i32| {
         let words =
-            "campaign overtake-without-brake -n 12 --seed 1 --sensors ground-truth --no-gate --record failures:0";
+            "campaign overtake-without-brake -n 12 --seed 1 --sensors ground-truth --no-gate --no-validity-checks \
+             --record failures:0";
         let limit = if controller == "mis" { &[][..] } else { &["--controller-timeout-ms", "60000"] };
         let more = [&["--controller", controller, "--out", name], limit].concat();
         let output = program().current_dir(folder.path()).args(words.split(' ')).args(more).output().unwrap();

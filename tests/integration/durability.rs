@@ -186,17 +186,29 @@ fn samples_that_ended_in_an_error_are_run_again_on_request() {
     let controller = format!("exec:sh {}", script.display());
     let scenario = library("low-thw-overtake");
     let campaign = |more: &[&str]| {
-        let fixed = ["campaign", scenario.to_str().unwrap(), "-n", "4", "--no-gate", "--out", out.to_str().unwrap()];
+        let fixed = ["campaign", scenario.to_str().unwrap(), "-n", "4", "--out", out.to_str().unwrap()];
+        let fixed = fixed.iter().chain(&["--set", "duration-s=2", "--set", "expects=[]"]);
         let controller = ["--record", "failures:0", "--controller", &controller, "--controller-timeout-ms", "60000"];
-        closecall(fixed.iter().chain(&controller).chain(more))
+        closecall(fixed.chain(&controller).chain(more))
     };
-    assert_eq!(code(&campaign(&[])), 5);
+    assert_eq!(code(&campaign(&["--no-gate"])), 5);
     fs::write(&marker, "").unwrap();
-    assert_eq!(code(&campaign(&["--resume"])), 5, "errors are kept");
-    let retried = campaign(&["--resume", "--retry-errors"]);
-    assert_ne!(code(&retried), 5, "{}", stderr(&retried));
+    assert_eq!(code(&campaign(&["--no-gate", "--resume"])), 5, "errors are kept");
+    let retried = campaign(&["--no-gate", "--resume", "--retry-errors"]);
+    let text = stdout(&retried, 0);
     assert!(stderr(&retried).contains("4 samples that had ended in an error were run again"), "{}", stderr(&retried));
-    assert_eq!(code(&campaign(&["--retry-errors"])), 2, "only with --resume");
+    assert_eq!(code(&campaign(&["--no-gate", "--retry-errors"])), 2, "only with --resume");
+    // The record, every report and a gate say so.
+    assert!(text.contains("4 FLAKY") && text.contains("run again after a failure, first in sample 0: "), "{text}");
+    for record in crate::support::records(&out) {
+        assert_eq!(record.arms[0].flaky.as_ref().map(|flaky| flaky.crashes), Some(1));
+    }
+    for file in ["report.html", "summary.md", "junit.xml"] {
+        let text = fs::read_to_string(out.join(file)).unwrap();
+        assert!(text.to_lowercase().contains("flaky"), "{file}: {text}");
+    }
+    let text = stdout(&campaign(&["--resume", "--max-flaky", "0"]), 1);
+    assert!(text.contains("flaky samples: 4, at most 0 allowed"), "{text}");
 }
 
 #[test]

@@ -2,9 +2,10 @@
 //! changes no byte of the results.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
-use crate::support::{closecall, code, folder, json, json_file, message, stderr, stdout};
+use crate::support::{closecall, code, folder, json, json_file, message, records, stderr, stdout};
 
 const SAMPLES: u64 = 60;
 
@@ -74,6 +75,28 @@ fn the_failures_of_an_earlier_campaign_end_a_gate_at_once_and_change_no_byte() {
     assert!(!waiting.exists());
     assert_same_bytes(&earlier.folder, &out);
     stdout(&closecall(["check", out.to_str().unwrap()]), 0);
+}
+
+#[test]
+fn a_sample_that_waits_with_an_error_is_flaky_if_it_succeeds_when_it_runs_again() {
+    let place = folder();
+    let earlier = Earlier::run(place.path());
+    let (out, marker, script) = (place.path().join("out"), place.path().join("works"), place.path().join("own.sh"));
+    let text = format!(
+        "#!/bin/sh\n[ -e '{}' ] || exit 3\necho '{{\"type\":\"hello\",\"protocol\":1}}'\nread -r line\n\
+         while read -r line; do echo '{{\"acceleration_mps2\":0.0,\"state\":\"following\"}}'; done\n",
+        marker.display()
+    );
+    fs::write(&script, text).unwrap();
+    fs::set_permissions(&script, fs::Permissions::from_mode(0o755)).unwrap();
+    let short = "--set duration-s=2 --set expects=[] --no-validity-checks";
+    let fixed = format!("--controller exec:{} --no-gate {short}", script.display());
+    assert_eq!(code(&campaign(&out, &format!("{fixed} --fail-fast {}", earlier.option()))), 5);
+    assert_eq!(fs::read_to_string(out.join("ahead.jsonl")).unwrap().lines().count(), 1);
+    fs::write(&marker, "").unwrap();
+    stdout(&campaign(&out, &format!("{fixed} --resume --retry-errors")), 0);
+    let flaky = records(&out).into_iter().filter(|record| record.arms[0].flaky.is_some());
+    assert_eq!(flaky.map(|record| record.sample).collect::<Vec<_>>(), earlier.failing[..1]);
 }
 
 #[test]

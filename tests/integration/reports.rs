@@ -129,6 +129,18 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
 }
 
 #[test]
+fn the_step_summary_names_the_worst_recorded_samples_without_a_link_into_the_folder() {
+    let text = fs::read_to_string(&FAILED.step).unwrap();
+    let summary = fs::read_to_string(FAILED.out.join("summary.md")).unwrap();
+    let worst: Vec<&str> = summary.lines().filter_map(|line| Some(line.split_once(" ([incident card](")?.0)).collect();
+    assert!(!worst.is_empty(), "{summary}");
+    for line in worst {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    assert!(text.contains("`recordings/") && !text.contains("](recordings/"), "{text}");
+}
+
+#[test]
 fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
     let out = &FAILED.out;
     let xml = fs::read_to_string(out.join("samples.xml")).unwrap();

@@ -301,6 +301,38 @@ fn a_controller_that_fails_only_while_it_is_recorded_does_not_cost_the_verdict()
 }
 
 #[test]
+fn a_recorded_run_that_is_not_the_run_of_the_campaign_makes_it_invalid() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let out = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let run = |name: &str, more: &[&str]| {
+        let mut command = program();
+        command
+            .args(["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--max-collisions", "4"])
+            .args(["--controller", &library, "--out", &out(name)])
+            .args(more);
+        with_fault(&mut command, Some("recorded-otherwise"))
+    };
+    let is_told = |output: &std::process::Output, name: &str| {
+        assert!(stdout(output, 7).contains("PASS"), "{}", stderr(output));
+        let told = message(output).matches("INVALID: sample ").count();
+        assert!(told == 2 && message(output).contains("differs from the campaign's journal"), "{}", stderr(output));
+        for file in ["junit.xml", "report.html", "summary.md"] {
+            let text = fs::read_to_string(folder.path().join(name).join(file)).unwrap();
+            assert!(text.contains("INVALID") && text.contains("differs from the campaign"), "{file}: {text}");
+        }
+    };
+    is_told(&run("whole", &["--record", "random:2"]), "whole");
+    for part in ["1/2", "2/2"] {
+        // The samples of a part do not decide every requirement.
+        stdout(&run(&part.replace('/', "-"), &["--record", "failures:0", "--partition", part]), 4);
+    }
+    let mut command = program();
+    command.args(["tool", "merge", &out("1-2"), &out("2-2"), "--out", &out("merged"), "--record", "random:2"]);
+    is_told(&with_fault(command.args(["--max-collisions", "4"]), Some("recorded-otherwise")), "merged");
+}
+
+#[test]
 fn a_mirrored_run_that_takes_too_long_is_not_checked_and_no_defect_of_the_simulator() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
@@ -320,8 +352,12 @@ fn a_mirrored_run_that_takes_too_long_is_not_checked_and_no_defect_of_the_simula
         let checks = record.arms[0].checks.as_ref().unwrap();
         assert!(checks.broken.is_empty() && checks.not_checked.as_ref().unwrap().contains("no answer within 300 ms"));
     }
-    // A resumption keeps that, and runs them again on request.
+    // A resumption keeps that, and runs them again on request: to the same outcomes.
     assert!(stdout(&run(None, &["--resume"]), 0).contains("not checked: 2 runs"));
+    let kept = fs::read(out.join("journal.jsonl")).unwrap();
+    let text = stdout(&run(Some("slower"), &["--resume", "--retry-errors"]), 7);
+    assert!(text.contains("the same run gave another outcome when repeated: 2 of 2 checked"), "{text}");
+    fs::write(out.join("journal.jsonl"), kept).unwrap();
     let text = stdout(&run(None, &["--resume", "--retry-errors"]), 0);
     assert!(text.contains("checked: 2 runs") && !text.contains("not checked: 2"), "{text}");
 }

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! The most important files are written first. A file that cannot be written costs no other file,
-//! and never the verdict: it is an [`ArtifactError`], which the caller shows.
+//! and never the verdict: it is an [`ArtifactError`], which the caller shows. A recorded run that is
+//! not the run of the campaign makes it INVALID.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ use super::arm_pairs::write_arm_pairs;
 use super::findings::{Findings, Recordings};
 use super::html::write_html;
 use super::junit::write_junit;
-use super::markdown::{markdown, write_markdown};
+use super::markdown::{markdown, recorded, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
 use super::recordings::{Recorded, RecordedSample, Still, record};
@@ -58,6 +59,9 @@ pub struct ArtifactError {
 pub struct Written {
     /// The recordings.
     pub recorded: Vec<RecordedSample>,
+    /// The recorded runs that are not the runs of the campaign, in words. The campaign is INVALID:
+    /// the files that are written after the recordings say so.
+    pub differences: Vec<String>,
     /// The files that could not be written.
     pub failures: Vec<ArtifactError>,
 }
@@ -108,7 +112,7 @@ impl CampaignReport<'_> {
         let junit = self
             .with_findings(Some(folder), without, |findings| write_junit(&folder.file("junit.xml"), findings, &wall_s));
         written.note("junit.xml", junit);
-        written.note(&step_summary_name(), self.append_step_summary(Some(folder)));
+        let summarised = written.note(&step_summary_name(), self.append_step_summary(Some(folder), without, markdown));
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
         let path = folder.file("outcomes.parquet");
         let outcomes = rows(folder, self.manifest)
@@ -123,13 +127,14 @@ impl CampaignReport<'_> {
             written.note("arm_pairs.parquet", write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary));
         }
         self.write_pages(folder, without, &mut written);
-        let Recorded { paths, samples, stills, failures } = match record(folder, &files, selection, self.command_for) {
-            Ok(recorded) => recorded,
-            Err(error) => {
-                written.note::<(), _>("the recordings", Err(error));
-                Recorded::default()
-            }
-        };
+        let Recorded { paths, samples, stills, differences, failures } =
+            match record(folder, &files, selection, self.command_for) {
+                Ok(recorded) => recorded,
+                Err(error) => {
+                    written.note::<(), _>("the recordings", Err(error));
+                    Recorded::default()
+                }
+            };
         written.recorded = samples;
         for (artifact, error) in failures {
             written.note::<(), _>(&artifact, Err(error));
@@ -137,12 +142,20 @@ impl CampaignReport<'_> {
         if !paths.is_empty() {
             // Once more, with links to the recordings.
             let with = Looks { recordings: &paths, stills: &stills, slowest: &slowest };
-            self.write_pages(folder, with, &mut written);
-            let junit = self.with_findings(Some(folder), with, |findings| {
+            let mut judged = self.judged.clone();
+            judged.add_invalid(differences.clone());
+            let report = CampaignReport { judged: &judged, ..*self };
+            report.write_pages(folder, with, &mut written);
+            let junit = report.with_findings(Some(folder), with, |findings| {
                 write_junit(&folder.file("junit.xml"), findings, &wall_s)
             });
             written.note("junit.xml", junit);
+            if summarised.is_some() {
+                let more = |findings: &Findings<'_>| recorded(findings, &differences);
+                written.note(&step_summary_name(), report.append_step_summary(Some(folder), with, more));
+            }
         }
+        written.differences = differences;
         written.note("samples.xml", self.write_samples(folder, &paths));
         written
     }
@@ -182,7 +195,8 @@ impl CampaignReport<'_> {
     /// Appends the summary of a campaign without a folder to the file of the CI server.
     pub fn write_without_folder(&self) -> Written {
         let mut written = Written::default();
-        written.note(&step_summary_name(), self.append_step_summary(None));
+        let without = Looks { recordings: &Recordings::new(), stills: &[], slowest: &[] };
+        written.note(&step_summary_name(), self.append_step_summary(None, without, markdown));
         written
     }
 
@@ -224,13 +238,17 @@ impl CampaignReport<'_> {
         })
     }
 
-    /// Appends the summary to the file that a CI server shows for this step, if there is one.
-    fn append_step_summary(&self, folder: Option<&Folder>) -> Result<(), ReportError> {
+    /// Appends a text to the file that a CI server shows for this step, if there is one.
+    fn append_step_summary(
+        &self,
+        folder: Option<&Folder>,
+        looks: Looks<'_>,
+        text: impl FnOnce(&Findings<'_>) -> String,
+    ) -> Result<(), ReportError> {
         let Some(path) = std::env::var_os(STEP_SUMMARY).filter(|path| !path.is_empty()).map(PathBuf::from) else {
             return Ok(());
         };
-        let without = Looks { recordings: &Recordings::new(), stills: &[], slowest: &[] };
-        let text = self.with_findings(folder, without, markdown);
+        let text = self.with_findings(folder, looks, text);
         let written = input::append(&path).and_then(|mut file| file.write_all(text.as_bytes()));
         Ok(written.map_err(|source| WriteError::new(&path, source))?)
     }

@@ -8,7 +8,7 @@ use super::fidelity::{fidelity_markdown, fidelity_of};
 use super::findings::Findings;
 use super::origins::Origins;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
-use super::recordings::card_beside;
+use super::recordings::{Still, card_beside};
 use super::text::{goals, imposed, not_prevented};
 use super::words::{Reasons, p_text, sentence};
 use crate::escape::{in_markdown, markdown_code};
@@ -16,6 +16,7 @@ use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::verdict::Verdict;
 use closecall_scenarios::causal::LETTERS;
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::shown::shown;
@@ -44,14 +45,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     for reason in first {
         text.push_str(&format!("- {}\n", in_markdown(reason)));
     }
-    for (still, recording) in findings.worst_stills() {
-        let (verdict, scenario, sample) = (still.verdict, cell(&still.scenario), still.sample);
-        let card = card_beside(recording);
-        text.push_str(&format!(
-            "- {verdict}: {scenario}, sample {sample}: {} ([incident card]({card}))\n",
-            cell(&still.sentence)
-        ));
-    }
+    text.push_str(&worst_recorded(findings, |card| format!("[incident card]({card})")));
     if let Some(origins) = findings.folder.and_then(Origins::of) {
         text.push_str(&format!("- {}\n", in_markdown(&origins.choice_sentence())));
     }
@@ -94,6 +88,27 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         sampling.seed, sampling.design,
     ));
     shown(&text).into_owned()
+}
+
+/// Returns what the recordings add to a summary that was written before them. A CI server shows it
+/// apart from the folder, so that no link leads there.
+pub(super) fn recorded(findings: &Findings<'_>, differences: &[String]) -> String {
+    let mut text = String::new();
+    for difference in differences {
+        text.push_str(&format!("- {}: {}\n", Verdict::Invalid, in_markdown(difference)));
+    }
+    text.push_str(&worst_recorded(findings, markdown_code));
+    if text.is_empty() { text } else { shown(&format!("\n**Recorded samples**\n\n{text}\n")).into_owned() }
+}
+
+/// Returns the worst recorded samples, each with its incident card.
+fn worst_recorded(findings: &Findings<'_>, card: impl Fn(&str) -> String) -> String {
+    let line = |(still, recording): (&Still, &str)| {
+        let (verdict, scenario, sample) = (still.verdict, cell(&still.scenario), still.sample);
+        let (sentence, card) = (cell(&still.sentence), card(&card_beside(recording)));
+        format!("- {verdict}: {scenario}, sample {sample}: {sentence} ({card})\n")
+    };
+    findings.worst_stills().into_iter().map(line).collect()
 }
 
 fn counts(summary: &Summary) -> String {
@@ -229,7 +244,7 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
         let first_line = flaky.message.lines().next().unwrap_or_default();
         let (count, sample) = (flaky.count, flaky.first_sample);
         text.push_str(&format!(
-            "- {count} × FLAKY in {} (run again after a crash), first in sample {sample}: {}\n",
+            "- {count} × FLAKY in {} (run again after a failure), first in sample {sample}: {}\n",
             cell(arm),
             cell(first_line)
         ));

@@ -1,10 +1,12 @@
 //! Recordings of selected samples of a campaign, and the page that shows them.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
 use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
-use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
+use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE, difference};
+use closecall_campaign::record::{Agreement, Record};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::ScenarioFile;
@@ -73,12 +75,14 @@ pub(super) struct Recorded {
     pub(super) samples: Vec<RecordedSample>,
     /// Pictures of the recorded samples, in the same order.
     pub(super) stills: Vec<Still>,
+    /// The recorded runs that are not the runs of the campaign, in words.
+    pub(super) differences: Vec<String>,
     /// The recordings that failed, in words, and the reasons.
     pub(super) failures: Vec<(String, ReportError)>,
 }
 
-/// Runs the selected samples again, records all arms of each in one file, and writes the page. A
-/// sample that cannot be recorded costs no other.
+/// Runs the selected samples again, compares them with the journal, records all arms of each in one
+/// file, and writes the page. A sample that cannot be recorded costs no other.
 pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
@@ -92,7 +96,9 @@ pub(super) fn record(
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
     let (mut recorded, mut entries) = (Recorded::default(), Vec::new());
-    for (name, chosen) in choose(&saved, scenarios, selection)? {
+    let all = choose(&saved, scenarios, selection)?;
+    let records = records_of(&saved, &all)?;
+    for (name, chosen) in all {
         create_folder(&path)?;
         let entry = match record_one(&saved, name, &chosen, command_for) {
             Ok(entry) => entry,
@@ -109,6 +115,8 @@ pub(super) fn record(
             }
         }
         for outcome in &entry.outcomes {
+            let differs = records.iter().any(|record| record.agreement(outcome) == Agreement::Differs);
+            recorded.differences.extend(differs.then(|| difference(outcome)));
             let key = (name.to_owned(), chosen.sample, outcome.controller.clone());
             recorded.paths.insert(key, format!("{RECORDINGS}/{}", entry.file));
         }
@@ -159,6 +167,17 @@ fn choose<'a>(
         }
     }
     Ok(all)
+}
+
+/// Returns the journal's records of the chosen samples.
+fn records_of(saved: &SavedCampaign, all: &[(&str, Chosen)]) -> Result<Vec<Record>, ReportError> {
+    if all.is_empty() {
+        return Ok(Vec::new());
+    }
+    let keys: BTreeSet<(&str, u64)> = all.iter().map(|(name, chosen)| (*name, chosen.sample)).collect();
+    let is_chosen = |record: &Record| keys.contains(&(record.scenario.as_str(), record.sample));
+    let records = saved.folder().records()?.filter(|record| record.as_ref().map_or(true, is_chosen));
+    Ok(records.collect::<Result<_, _>>()?)
 }
 
 fn record_one(

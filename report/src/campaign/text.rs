@@ -45,7 +45,7 @@ impl fmt::Display for CountsText<'_> {
     }
 }
 
-/// The flaky samples of each scenario and arm, with the message of the first crash. Empty if there
+/// The flaky samples of each scenario and arm, with the message of the first failure. Empty if there
 /// are none.
 #[derive(Clone, Copy, Debug)]
 pub struct FlakyText<'a>(pub &'a Overview);
@@ -57,7 +57,7 @@ impl fmt::Display for FlakyText<'_> {
                 let first_line = message.lines().next().unwrap_or_default();
                 writeln!(
                     f,
-                    "FLAKY: {}: {count} × {arm}, run again after a crash, first in sample {first_sample}: {first_line}",
+                    "FLAKY: {}: {count} × {arm}, run again after a failure, first in sample {first_sample}: {first_line}",
                     scenario.name
                 )?;
             }

@@ -31,7 +31,7 @@ pub fn campaign_report(report: &CampaignReport<'_>, wall_s: Option<f64>) -> Valu
     stamped(value, Some(manifest.sampling.seed), Some(&manifest.settings()))
 }
 
-/// Returns the flaky samples of each scenario and arm, with the message of the first crash.
+/// Returns the flaky samples of each scenario and arm, with the message of the first failure.
 fn flaky_samples(overview: &Overview) -> Value {
     let of_scenario = |scenario: &ScenarioOverview| -> Vec<Value> {
         let of_arm = |(arm, flaky): (&String, &ErrorGroup)| {

@@ -45,7 +45,7 @@ const RATES: [f64; 3] = [0.02, 0.1, 0.3];
 pub(super) enum Violation {
     /// The journal has the outcome of another sample.
     OtherOutcome { sample: u64, arm: usize },
-    /// A sample was run again after a crash, and its record does not say so.
+    /// A sample was run again after a failure, and its record does not say so.
     SilentRetry { arm: usize, sample: u64, crashes: u32, told: u32 },
     /// A check that took too long counts as a defect of the simulator.
     TimeAsDefect { sample: u64, arm: usize },
@@ -68,7 +68,7 @@ impl fmt::Display for Violation {
                 write!(f, "the journal files another outcome under sample {sample} of arm {arm}")
             }
             Self::SilentRetry { arm, sample, crashes, told } => {
-                write!(f, "sample {sample} of arm {arm} has an outcome after {crashes} crashes, and tells of {told}")
+                write!(f, "sample {sample} of arm {arm} has an outcome after {crashes} failures, and tells of {told}")
             }
             Self::TimeAsDefect { sample, arm } => {
                 write!(f, "a check of sample {sample} in arm {arm} took too long, and counts as broken")
@@ -177,6 +177,7 @@ impl Setup {
         let (mut summary, mut records, mut run_now) = (campaign.summary(), 0, 0);
         let mut judge = Judge::new(&campaign.works, &self.gates, campaign.inference);
         let locked = Folder::lock(path, &self.manifest, true).unwrap();
+        let before = if path.join(JOURNAL).exists() { journal_lines(path) } else { Vec::new() };
         let ended = campaign.run(Some(&locked), |next| {
             summary.push(next.record);
             judge.push(next.record);
@@ -195,6 +196,7 @@ impl Setup {
             return Err(violation);
         }
         self.check_outcomes(path)?;
+        check_retries(&before, &journal_lines(path))?;
         let complete: Result<Vec<Record>, FolderError> = locked.folder.complete_records().unwrap().collect();
         if complete.is_ok() != (journal_lines(path).len() as u64 == SAMPLES) {
             return Err(Violation::PartialData { has: records });
@@ -303,6 +305,19 @@ impl Setup {
             other => Err(Violation::Unlike { difference: format!("the verdict is {other:?}") }),
         }
     }
+}
+
+/// Checks that each sample says so that had ended in an error before it had an outcome.
+fn check_retries(before: &[Record], after: &[Record]) -> Result<(), Violation> {
+    for record in after {
+        let Some(earlier) = before.iter().find(|earlier| earlier.sample == record.sample) else { continue };
+        for (index, (arm, earlier)) in record.arms.iter().zip(&earlier.arms).enumerate() {
+            if arm.result.is_ok() && earlier.result.is_err() && arm.flaky.is_none() {
+                return Err(Violation::SilentRetry { arm: index, sample: record.sample, crashes: 1, told: 0 });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The course of one run of the campaign.

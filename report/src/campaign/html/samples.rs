@@ -129,7 +129,7 @@ pub(super) fn flaky(scenario: &ScenarioOverview) -> Markup {
     let head = html! {
         (text_heads(&["controller"]))
         (number_heads(&["samples", "first"]))
-        th { "message of the first crash" }
+        th { "message of the first failure" }
     };
     let rows = html! {
         @for (arm, flaky) in &scenario.flaky {
@@ -143,7 +143,7 @@ pub(super) fn flaky(scenario: &ScenarioOverview) -> Markup {
     };
     html! {
         h3 { "Flaky" }
-        p { "These samples crashed or hung, and have an outcome only because they were run again in a new process." }
+        p { "These samples failed, and have an outcome only because they were run again." }
         (table(&head, &rows))
     }
 }

@@ -59,7 +59,7 @@ pub struct ScenarioOverview {
     pub influence: InfluenceCounts,
     /// The worst samples of the arm under test, beginning with the worst.
     pub worst: Vec<WorstSample>,
-    /// Samples with an outcome only because they were run again after a crash or a hang, by arm.
+    /// Samples with an outcome only because they were run again after a failure, by arm.
     pub flaky: BTreeMap<String, ErrorGroup>,
     /// The samples with the smallest hashes of their number, for each fate: an even choice of all
     /// samples.
