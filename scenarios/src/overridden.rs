@@ -29,6 +29,7 @@ pub(super) fn weakened(before: &ScenarioConfig, after: &ScenarioConfig) -> Vec<S
     weakened.extend(weaker_probability(&before.gate, &after.gate));
     let requirements = before.requirements.iter().filter(|requirement| !after.requirements.contains(requirement));
     weakened.extend(requirements.map(|requirement| format!("requirement {requirement}")));
+    weakened.extend((after.function != before.function).then(|| format!("function {}", before.function.name())));
     let expects = before.expects.iter().filter(|flag| !after.expects.contains(flag));
     weakened.extend(expects.map(|flag| format!("expects {}", flag.measure().name)));
     // A share that is NaN is weaker than any number, so the comparison must fail for NaN.
@@ -89,6 +90,7 @@ mod tests {
             ("checks.MIS-2=[]", "MIS-2: upper(induced) <= 0.03"),
             ("checks.MIS-2=['upper(induced) <= 0.03']", "MIS-2: upper(others_collided_alone)"),
             ("requirements=[]", "requirement MIS-1"),
+            ("function=aeb", "function mis"),
             ("expects=['lead_braked']", "expects rear_near"),
             ("expects-share=0.1", "expects-share 0.95"),
             ("parameters.closing-mps.observed.max=14", "observed range of closing-mps"),
