@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::runner::{Sampling, concrete};
-use closecall_recorded::scans::{Labels, Recording, ScanOptions};
+use closecall_recorded::scans::{Labels, Poses, Recording, ScanOptions};
 use closecall_report::perception::RecordedReport;
 use closecall_report::tables::TrackRecorder;
 use closecall_scenarios::sampling::Design;
@@ -17,7 +17,7 @@ use closecall_studies::perception::recorded::{RecordedInput, study_recording};
 use super::CliError;
 use super::args::{Format, SetArgs};
 use super::help::{examples, heading};
-use super::output::{outln, print_text, print_written, reading};
+use super::output::{outln, print_text, print_written, reading, warn};
 use super::protect::{must_be_writable, protect};
 use crate::exit_code::ExitCode;
 
@@ -147,7 +147,7 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
                        `heading_rad`; without them, the road is the arc that the ego drives";
         return Err(CliError::usage(message));
     }
-    let labels = labels(&recording, args.labels.as_deref())?;
+    let labels = labels(&recording, args.labels.as_deref(), &poses)?;
     let ego = scenario.vehicle(scenario.ego, key);
     let frame = match args.frame {
         Frame::Ego => PointFrame::Ego,
@@ -174,6 +174,9 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
             }
         })
     })?;
+    if let Some(doubt) = study.doubt() {
+        warn(format_args!("{}: {doubt}", args.recording.display()));
+    }
     let report =
         RecordedReport { recording: args.recording.display().to_string(), scenario: file.config().name.clone(), study };
     match args.format {
@@ -189,8 +192,8 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
 
 /// Reads the labels: from the file if it is given, else the labels beside the recording, if
 /// there are any.
-fn labels(recording: &Recording, file: Option<&Path>) -> Result<Option<Labels>, CliError> {
+fn labels(recording: &Recording, file: Option<&Path>, poses: &Poses) -> Result<Option<Labels>, CliError> {
     let beside = recording.companion("labels");
     let path = file.or_else(|| beside.exists().then_some(&*beside));
-    Ok(path.map(Labels::read).transpose()?)
+    Ok(path.map(|path| Labels::read(path, poses)).transpose()?)
 }

@@ -461,6 +461,11 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
             "scans.csv, line 3, column `file`: `scan-00.pcd` is listed twice",
         ),
         ("scans.csv", replaced("scans.csv", "scan-00.pcd,0.0", "scan-00.pcd,1e18"), "a time in seconds is needed"),
+        (
+            "scans.csv",
+            replaced("scans.csv", "scan-01.pcd,0.1\n", ""),
+            "scans.csv: it does not list 1 of the *.pcd files in its folder, such as `scan-01.pcd`: each needs a row",
+        ),
         ("poses.csv", column("poses.csv", 4, "108.0"), "m/s and m are needed"),
         (
             "poses.csv",
@@ -469,6 +474,16 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
         ),
         ("poses.csv", column("poses.csv", 3, "1.6"), "counter-clockwise from x to y"),
         ("labels.csv", column("labels.csv", 0, "99.0"), "times must increase"),
+        (
+            "labels.csv",
+            column("labels.csv", 6, "129.6"),
+            "labels.csv: `a` drives 648 m by its speeds, and 180 m by its places: m in the ego's frame (x ahead, y to the left) and m/s",
+        ),
+        (
+            "labels.csv",
+            column("labels.csv", 5, "1.6"),
+            "half of the headings differ by 1.6 rad or more from the direction in which `a` drives: they are in rad relative",
+        ),
         ("labels.csv", column("labels.csv", 5, "180.0"), "an angle from -2π to 2π rad is needed"),
         ("labels.csv", column("labels.csv", 7, "4600"), "a length from 0.1 to 40 m is needed"),
         (
@@ -494,6 +509,26 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
         assert_eq!(code(&output), 3, "{expected}: {text}");
         assert!(text.contains(expected), "{expected}: {text}");
         std::fs::write(recording.join(name), before).unwrap();
+    }
+    // Labels with other axes match no track.
+    for (axis, value, expected) in [
+        (
+            4,
+            "7.5",
+            "my-recording: 1 labelled vehicle behind the ego, and no confirmed track is ever near one: labels have x ahead",
+        ),
+        (
+            3,
+            "50.0",
+            "my-recording: no labelled vehicle is up to 150 m behind the ego, where vehicles count: labels have x ahead",
+        ),
+    ] {
+        let before = good("labels.csv");
+        std::fs::write(recording.join("labels.csv"), column("labels.csv", axis, value)).unwrap();
+        let output = closecall([&args[..], &["--drop-invalid"]].concat());
+        let text = message(&output);
+        assert!(code(&output) == 0 && text.contains(expected), "{expected}: {text}");
+        std::fs::write(recording.join("labels.csv"), before).unwrap();
     }
     // The axis and the left of the sensor are swapped.
     let clouds: Vec<PathBuf> = std::fs::read_dir(&recording).unwrap().map(|file| file.unwrap().path()).collect();

@@ -73,6 +73,14 @@ pub enum ScanFileProblem {
     /// The index of a folder names no files.
     #[error("it lists no file; a row such as `scan-0.pcd,0.04` is needed for each scan")]
     EmptyIndex,
+    /// The index of a folder leaves out files.
+    #[error("it does not list {number} of the *.pcd files in its folder, such as `{first}`: each needs a row")]
+    NotListed {
+        /// Number of these files.
+        number: usize,
+        /// The name of the first one.
+        first: String,
+    },
     /// A table has no rows.
     #[error("there are no rows")]
     NoRows,

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::error::{ScanFileError, ScanFileProblem};
+use super::error::{Origin, ScanFileError, ScanFileProblem};
+use super::poses::{Mover, Pose, Poses, check_motion};
 use super::text_table::{TableFormat, read_table};
 
 /// Longest time between two labels of a vehicle between which it is interpolated (s).
@@ -45,11 +46,12 @@ pub struct Labels {
 }
 
 impl Labels {
-    /// Reads a table of labels.
+    /// Reads a table of labels. `poses` say where the ego is.
     ///
     /// # Errors
-    /// [`ScanFileError`] with the line and the column that is wrong.
-    pub fn read(path: &Path) -> Result<Self, ScanFileError> {
+    /// [`ScanFileError`] with the line and the column that is wrong, or if the speeds or the headings
+    /// of a vehicle contradict its path.
+    pub fn read(path: &Path, poses: &Poses) -> Result<Self, ScanFileError> {
         let rows = read_table(path, FORMAT)?;
         let mut vehicles: BTreeMap<String, Vec<Label>> = BTreeMap::new();
         for row in &rows {
@@ -84,6 +86,9 @@ impl Labels {
             }
             of_vehicle.push(label);
         }
+        for (name, labels) in &vehicles {
+            check(name, labels, poses).map_err(|problem| Origin::file(path).error(problem))?;
+        }
         let (names, of_vehicles) = vehicles.into_iter().unzip();
         Ok(Self { names, of_vehicles })
     }
@@ -106,6 +111,21 @@ impl Labels {
     pub fn at(&self, time: Time) -> impl Iterator<Item = (usize, Label)> {
         self.of_vehicles.iter().enumerate().filter_map(move |(index, labels)| Some((index, at(labels, time)?)))
     }
+}
+
+/// Refuses the speeds and headings of a vehicle that contradict its path.
+fn check(name: &str, labels: &[Label], poses: &Poses) -> Result<(), ScanFileProblem> {
+    let pose = |label: &Label| {
+        let (at_m, yaw_rad) = poses.unmoved(label.time, label.at_m)?;
+        let yaw_rad = yaw_rad + label.heading_rad;
+        Some(Pose { time: label.time, at_m, yaw_rad, speed_mps: label.speed_mps, ..Pose::default() })
+    };
+    let path: Vec<Pose> = labels.iter().filter_map(pose).collect();
+    let needed = [
+        "m in the ego's frame (x ahead, y to the left) and m/s over ground are needed",
+        "they are in rad relative to the ego's, counter-clockwise",
+    ];
+    check_motion(Mover { name: &format!("`{name}`"), needed }, &path)
 }
 
 /// Returns the label at a time, interpolated between two that are near enough.

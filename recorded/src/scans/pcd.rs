@@ -42,13 +42,19 @@ impl PcdRecording {
     pub(super) fn open(folder: &Path, options: &ScanOptions) -> Result<Self, ScanFileError> {
         let origin = Origin::file(folder);
         let is_cloud = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("pcd"));
-        let mut files = std::fs::read_dir(folder).map_err(|error| origin.error(error))?.filter_map(Result::ok);
-        if !files.any(|file| is_cloud(&file.path())) {
+        let files = std::fs::read_dir(folder).map_err(|error| origin.error(error))?.filter_map(Result::ok);
+        let mut clouds: Vec<PathBuf> = files.map(|file| file.path()).filter(|path| is_cloud(path)).collect();
+        if clouds.is_empty() {
             return Err(origin.error(ScanFileProblem::EmptyFolder));
         }
         let rows = read_table(&folder.join(INDEX), INDEX_FORMAT)?;
         let (mut entries, mut listed) = (Vec::with_capacity(rows.len()), HashSet::new());
         for row in &rows {
+            let name = row.needed_text(0)?;
+            let path = folder.join(name);
+            if !listed.insert(path.clone()) {
+                return Err(row.place(0).error(ScanFileProblem::Csv(format!("`{name}` is listed twice"))));
+            }
             let sensor = match row.text(2) {
                 Some(name) => match options.sensor(name) {
                     Ok(Some(sensor)) => sensor,
@@ -59,11 +65,6 @@ impl PcdRecording {
             };
             #[expect(clippy::cast_possible_truncation, reason = "the sensor's place is in single precision")]
             let sensor_x_m = row.number_or_none(4)?.map(|x_m| x_m as f32);
-            let name = row.needed_text(0)?;
-            let path = folder.join(name);
-            if !listed.insert(path.clone()) {
-                return Err(row.place(0).error(ScanFileProblem::Csv(format!("`{name}` is listed twice"))));
-            }
             entries.push(Entry {
                 path,
                 time: row.time(1)?,
@@ -72,8 +73,14 @@ impl PcdRecording {
                 sensor_x_m,
             });
         }
+        let index = Origin::file(folder.join(INDEX));
         if entries.is_empty() {
-            return Err(Origin::file(folder.join(INDEX)).error(ScanFileProblem::EmptyIndex));
+            return Err(index.error(ScanFileProblem::EmptyIndex));
+        }
+        clouds.retain(|path| !listed.contains(path));
+        if let Some(first) = clouds.iter().min() {
+            let first = first.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            return Err(index.error(ScanFileProblem::NotListed { number: clouds.len(), first }));
         }
         // Several sensors may be listed one after the other.
         entries.sort_by_key(|entry| entry.time);

@@ -61,6 +61,33 @@ pub struct Pose {
     pub on_road: Option<[f64; 3]>,
 }
 
+/// Two poses of the ego, and the share of the way from one to the other.
+#[derive(Clone, Copy)]
+struct Between {
+    before: usize,
+    after: usize,
+    share: f64,
+}
+
+impl Between {
+    /// Returns a value between two poses.
+    fn mixed(self, of: &dyn Fn(usize) -> f64) -> f64 {
+        let Self { before, after, share } = self;
+        if share == 0.0 { of(before) } else { of(before) + share * (of(after) - of(before)) }
+    }
+}
+
+/// A vehicle whose motion is compared with its path, in the words of messages.
+#[derive(Clone, Copy)]
+pub(super) struct Mover<'a> {
+    pub(super) name: &'a str,
+    /// What is needed of speeds and places, and of headings.
+    pub(super) needed: [&'a str; 2],
+}
+
+const EGO: Mover<'_> =
+    Mover { name: "the ego", needed: ["m/s and m are needed", "they are in rad, counter-clockwise from x to y"] };
+
 /// The poses of the ego, in order of time.
 #[derive(Clone, Debug)]
 pub struct Poses {
@@ -127,7 +154,7 @@ impl Poses {
     }
 
     fn from_ordered(origin: Origin, poses: Vec<Pose>) -> Result<Self, ScanFileError> {
-        check_motion(&poses).map_err(|problem| origin.error(problem))?;
+        check_motion(EGO, &poses).map_err(|problem| origin.error(problem))?;
         let (mut yaw_rad, mut driven_m) = (Vec::with_capacity(poses.len()), Vec::with_capacity(poses.len()));
         for (index, pose) in poses.iter().enumerate() {
             match index.checked_sub(1) {
@@ -163,21 +190,12 @@ impl Poses {
     /// # Errors
     /// [`ScanFileError`] if there is no pose at this time.
     pub fn place_at(&self, time: Time, road: &Road, d_m: f64) -> Result<(Road, VehicleState), ScanFileError> {
-        let next = self.poses.partition_point(|pose| pose.time < time);
-        let exact = self.poses.get(next).filter(|pose| pose.time == time).map(|_| (next, next, 0.0));
-        let between = || {
-            let before = next.checked_sub(1)?;
-            let gap = self.poses.get(next)?.time - self.poses[before].time;
-            (gap <= LONGEST_GAP).then(|| (before, next, (time - self.poses[before].time).s() / gap.s()))
-        };
-        let Some((before, after, share)) = exact.or_else(between) else {
+        let Some(between) = self.between(time) else {
             let [first_s, last_s] = [self.poses[0].time.s(), self.last().s()];
             return Err(self.origin.error(ScanFileProblem::NoPose { time_s: time.s(), first_s, last_s }));
         };
-        let mixed = |of: &dyn Fn(usize) -> f64| match share {
-            0.0 => of(before),
-            _ => of(before) + share * (of(after) - of(before)),
-        };
+        let Between { before, after, .. } = between;
+        let mixed = |of: &dyn Fn(usize) -> f64| between.mixed(of);
         let yaw_rate_radps = match self.poses[before].yaw_rate_radps {
             Some(_) => mixed(&|index| self.poses[index].yaw_rate_radps.unwrap_or_default()),
             None => self.yaw_rate_radps(before),
@@ -200,6 +218,28 @@ impl Poses {
         Ok((road, VehicleState { s_m, d_m, ..state }))
     }
 
+    /// Returns the poses between which a time lies; `None` if there is no pose near enough.
+    fn between(&self, time: Time) -> Option<Between> {
+        let after = self.poses.partition_point(|pose| pose.time < time);
+        if self.poses.get(after)?.time == time {
+            return Some(Between { before: after, after, share: 0.0 });
+        }
+        let before = after.checked_sub(1)?;
+        let gap = self.poses[after].time - self.poses[before].time;
+        let share = (time - self.poses[before].time).s() / gap.s();
+        (gap <= LONGEST_GAP).then_some(Between { before, after, share })
+    }
+
+    /// Returns the place of a point of the ego's frame in the frame that does not move (m), and the
+    /// heading of the ego there (rad). `None` at a time without a pose.
+    pub(super) fn unmoved(&self, time: Time, [x_m, y_m]: [f64; 2]) -> Option<([f64; 2], f64)> {
+        let between = self.between(time)?;
+        let [ego_x_m, ego_y_m] = [0, 1].map(|axis| between.mixed(&|index| self.poses[index].at_m[axis]));
+        let yaw_rad = between.mixed(&|index| self.yaw_rad[index]);
+        let (sin, cos) = maths::sin_cos(yaw_rad);
+        Some(([ego_x_m + cos * x_m - sin * y_m, ego_y_m + sin * x_m + cos * y_m], yaw_rad))
+    }
+
     /// Returns the mean curvature of the path before a pose (1/m).
     fn curvature_per_m(&self, last: usize) -> f64 {
         let driven_m = &self.driven_m[..=last];
@@ -217,7 +257,8 @@ impl Poses {
 }
 
 /// Refuses speeds and headings that contradict the path. Their unit or their frame is another.
-fn check_motion(poses: &[Pose]) -> Result<(), ScanFileProblem> {
+pub(super) fn check_motion(mover: Mover<'_>, poses: &[Pose]) -> Result<(), ScanFileProblem> {
+    let Mover { name, needed } = mover;
     let (mut path_m, mut by_speed_m, mut beside_rad, mut first) = (0.0_f64, 0.0_f64, Vec::new(), 0);
     for (last, pose) in poses.iter().enumerate() {
         let elapsed = pose.time - poses[first].time;
@@ -242,14 +283,15 @@ fn check_motion(poses: &[Pose]) -> Result<(), ScanFileProblem> {
     let [less_m, more_m] = [path_m.min(by_speed_m), path_m.max(by_speed_m)];
     if more_m >= LEAST_DRIVEN_M && more_m > MOST_RATIO * less_m {
         return Err(ScanFileProblem::Motion(format!(
-            "the ego drives {by_speed_m:.0} m by its speeds, and {path_m:.0} m by its places: m/s and m are needed"
+            "{name} drives {by_speed_m:.0} m by its speeds, and {path_m:.0} m by its places: {}",
+            needed[0]
         )));
     }
     beside_rad.sort_by(f64::total_cmp);
     match beside_rad.get(beside_rad.len() / 2) {
         Some(off_rad) if *off_rad > MOST_BESIDE_RAD => Err(ScanFileProblem::Motion(format!(
-            "half of the headings differ by {off_rad:.1} rad or more from the direction in which the ego drives: they are in \
-             rad, counter-clockwise from x to y"
+            "half of the headings differ by {off_rad:.1} rad or more from the direction in which {name} drives: {}",
+            needed[1]
         ))),
         _ => Ok(()),
     }

@@ -14,6 +14,7 @@ use closecall_recorded::scans::{Labels, Poses, Recording, ScanFileError, ScanFil
 use closecall_sensors::lidar::{MAX_INTENSITY, RecordedPoints};
 use closecall_sensors::{RecordedPerception, RecordedScanError, Scene, SceneVehicle, SensorError, TrackAudit};
 use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::words::counted;
 use closecall_traffic::{
     CONTROL_STEP, Dimensions, Environment, Road, Time, Track, TrackId, TrackStatus, Vehicle, VehicleClass,
     VehicleState, maths,
@@ -91,6 +92,26 @@ pub struct RecordedStudy {
     pub confirmed_lives_s: Vec<f64>,
     /// The figures by the labels, if there are any.
     pub truth: Option<TruthFigures>,
+}
+
+impl RecordedStudy {
+    /// Returns why the labels may have another frame than the recording; `None` if some track belongs
+    /// to a label, or there is no track that could.
+    pub fn doubt(&self) -> Option<String> {
+        let truth = self.truth.as_ref()?;
+        let frame = "labels have x ahead of the ego's centre, negative behind it, and y to the left (m)";
+        match truth.groups.first() {
+            None => Some(format!(
+                "no labelled vehicle is up to {} m behind the ego, where vehicles count: {frame}",
+                GAPS_M[0]
+            )),
+            Some(all) if all.recall == 0.0 && !self.confirmed_lives_s.is_empty() => Some(format!(
+                "{} behind the ego, and no confirmed track is ever near one: {frame}",
+                counted(all.vehicles as u64, "labelled vehicle")
+            )),
+            Some(_) => None,
+        }
+    }
 }
 
 /// What the labels show.
