@@ -9,7 +9,7 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use closecall_traffic::maths::{exp, ln};
+use closecall_traffic::maths::{exp, ln, powf};
 
 /// Coverage of the reported intervals.
 pub const COVERAGE: f64 = 0.95;
@@ -48,8 +48,13 @@ impl Mean {
         self.value > 0.0 && self.standard_error > 0.0
     }
 
+    /// Returns true if every value is 1: each run had the event.
+    fn is_certain(&self) -> bool {
+        self.value >= 1.0 && self.standard_error == 0.0
+    }
+
     /// Returns the two-sided interval of a probability; `None` if the mean is not above 0, or the
-    /// values do not scatter.
+    /// values do not scatter and are not all 1.
     pub fn interval_of_probability(&self, coverage: f64) -> Option<[f64; 2]> {
         let one_sided = 0.5 * (1.0 + coverage);
         Some([self.lower_bound(one_sided)?, self.upper_bound(one_sided)?])
@@ -57,13 +62,18 @@ impl Mean {
 
     /// Returns the one-sided lower bound of a probability; `None` if the mean is not above 0.
     pub fn lower_bound(&self, confidence: f64) -> Option<f64> {
-        self.has_bounds().then(|| self.value * exp(-self.factor(confidence) * self.standard_error / self.value))
+        if self.is_certain() {
+            // A probability p gives n values of 1 with pⁿ.
+            return Some(powf(1.0 - confidence, 1.0 / (self.degrees_of_freedom + 1.0)));
+        }
+        let low = || self.value * exp(-self.factor(confidence) * self.standard_error / self.value);
+        self.has_bounds().then(|| low().min(1.0))
     }
 
     /// Returns the one-sided upper bound of a probability; `None` if the mean is not above 0.
     pub fn upper_bound(&self, confidence: f64) -> Option<f64> {
         let high = || self.value * exp(self.factor(confidence) * self.standard_error / self.value);
-        self.has_bounds().then(|| high().min(1.0))
+        (self.has_bounds() || self.is_certain()).then(|| high().min(1.0))
     }
 
     /// Returns a one-sided upper bound of the mean of values from 0 to `largest` that holds for any
@@ -77,10 +87,11 @@ impl Mean {
         self.value + of_variance + 7.0 * log * largest / (3.0 * self.degrees_of_freedom)
     }
 
-    /// Returns the two-sided interval of a quantity of either sign.
-    pub fn interval(&self, coverage: f64) -> [f64; 2] {
+    /// Returns the two-sided interval of a quantity of either sign; `None` if the values do not
+    /// scatter.
+    pub fn interval(&self, coverage: f64) -> Option<[f64; 2]> {
         let half = self.factor(0.5 * (1.0 + coverage)) * self.standard_error;
-        [self.value - half, self.value + half]
+        (half > 0.0).then(|| [self.value - half, self.value + half])
     }
 
     /// Returns the width of the 95 % interval, relative to the value.
@@ -98,7 +109,7 @@ mod tests {
         let mean = Mean::of(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
         // t of 4 degrees of freedom at 97.5 %: 2.776.
         let half = 2.776 * (2.5_f64 / 5.0).sqrt();
-        let [low, high] = mean.interval(0.95);
+        let [low, high] = mean.interval(0.95).unwrap();
         assert!((low - 3.0 + half).abs() < 1e-3 && (high - 3.0 - half).abs() < 1e-3);
         assert!((mean.relative_width() - 2.0 * half / 3.0).abs() < 1e-3);
     }
@@ -108,7 +119,7 @@ mod tests {
         let mean = Mean::of(&[1e-6, 0.0, 0.0, 2e-6, 9e-6]).unwrap();
         let [low, high] = mean.interval_of_probability(0.95).unwrap();
         assert!(0.0 < low && low < mean.value && mean.value < high);
-        assert!(mean.interval(0.95)[0] < 0.0, "a symmetric interval would reach below 0");
+        assert!(mean.interval(0.95).unwrap()[0] < 0.0, "a symmetric interval would reach below 0");
     }
 
     #[test]
@@ -126,10 +137,16 @@ mod tests {
     }
 
     #[test]
-    fn no_event_and_no_scatter_have_no_interval() {
+    fn an_event_in_every_run_has_the_exact_bound_and_no_event_has_none() {
         // Six hundred events in six hundred runs do not show that the probability is 1.
-        assert_eq!(Mean::of(&[1.0; 600]).unwrap().interval_of_probability(0.95), None);
+        let always = Mean::of(&[1.0; 600]).unwrap();
+        let [low, high] = always.interval_of_probability(0.95).unwrap();
+        assert!((low - 0.993_871).abs() < 1e-6 && high == 1.0, "{low}");
+        assert_eq!(always.interval(0.95), None);
         assert_eq!(Mean::of(&[0.0; 10]).unwrap().interval_of_probability(0.95), None);
         assert_eq!(Mean::of(&[1.0]), None);
+        // Weights above 1 in every run: no bound is above 1.
+        let weighted: Vec<f64> = (0..600).map(|index| if index % 2 == 0 { 1.0 } else { 1.1 }).collect();
+        assert_eq!(Mean::of(&weighted).unwrap().interval_of_probability(0.95), Some([1.0; 2]));
     }
 }

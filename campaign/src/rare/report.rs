@@ -30,7 +30,8 @@ pub struct Estimate {
     pub of: String,
     /// The estimate.
     pub value: f64,
-    /// The 95 % interval; `None` of an event that never happened beside one that did.
+    /// The 95 % interval; `None` of an event that never happened beside one that did, and of a
+    /// difference that is the same in every run.
     pub interval_95: Option<[f64; 2]>,
     /// The mean from which both follow.
     #[serde(skip)]
@@ -150,12 +151,9 @@ impl RareReport {
         };
         let estimate = |(index, of): (usize, String), mean: Mean| Estimate {
             of,
-            value: mean.value,
-            interval_95: if index == 2 {
-                Some(mean.interval(COVERAGE))
-            } else {
-                mean.interval_of_probability(COVERAGE)
-            },
+            // The mean of weights may exceed 1, and no probability does.
+            value: mean.value.min(1.0),
+            interval_95: if index == 2 { mean.interval(COVERAGE) } else { mean.interval_of_probability(COVERAGE) },
             mean,
         };
         let estimates = means.map_or_else(Vec::new, |means| {
@@ -272,10 +270,10 @@ impl RareReport {
 impl fmt::Display for RareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {} by {}, {}", self.scenario, self.event, self.method, counted(self.runs, "run"))?;
-        for Estimate { of, value, interval_95, .. } in &self.estimates {
+        for (index, Estimate { of, value, interval_95, .. }) in self.estimates.iter().enumerate() {
             match interval_95 {
                 Some([low, high]) => writeln!(f, "  {of}: {value:.3e}, 95 % interval {low:.3e} to {high:.3e}")?,
-                None if *value > 0.0 => {
+                None if *value > 0.0 || index == 2 => {
                     writeln!(f, "  {of}: {value:.3e}; no interval, because the runs do not scatter")?
                 }
                 None => writeln!(f, "  {of}: in no run; no interval")?,

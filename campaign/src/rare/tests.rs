@@ -141,7 +141,7 @@ fn two_methods_agree_on_a_difference() {
     let by_subset = subset(&mut Function(event), 3, Seed(3), goal).unwrap().means.unwrap();
     let truth = 2e-4 - 1e-4 * (1.0 - 2e-4);
     for means in [by_importance, by_subset] {
-        let [low, high] = means[2].interval(0.99);
+        let [low, high] = means[2].interval(0.99).unwrap();
         assert!(low <= truth && truth <= high, "{truth}: {low} to {high}");
         assert!((means[0].value - means[1].value - means[2].value).abs() < 1e-12);
     }
