@@ -47,6 +47,11 @@ const COVERAGE: f64 = 0.95;
 /// nearly normal mean: an assumption; 5 to 30 are plausible. The exact interval of the full chain
 /// needs none.
 const FEWEST_EVENTS: u64 = 10;
+/// Samples in which the modes disagree that the variance counts beyond the samples that show it: half
+/// a sample in each direction (A. Agresti and Y. Min, *Simple improved confidence intervals for
+/// comparing matched proportions*, Statistics in Medicine 24 (2005) 729–740). Modes that agree in
+/// every sample still disagree in some samples that nobody ran.
+const UNSEEN_DISAGREEMENTS: f64 = 1.0;
 
 /// A rate of the full chain, from its own runs and with the fast ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -344,7 +349,8 @@ fn rate(name: &str, pairs: &[[f64; 2]], more: &[f64]) -> Option<FidelityRate> {
     let samples = pairs.len() as u64;
     let beta = if of_fast > 0.0 { both / of_fast * m / (n + m) } else { 0.0 };
     let value = full - beta * (fast - others);
-    let variance = (of_full - 2.0 * beta * both) / n + beta * beta * of_fast * (1.0 / n + 1.0 / m);
+    let unseen = UNSEEN_DISAGREEMENTS * (beta / n).powi(2);
+    let variance = (of_full - 2.0 * beta * both) / n + beta * beta * of_fast * (1.0 / n + 1.0 / m) + unseen;
     let enough = events >= FEWEST_EVENTS && samples - events >= FEWEST_EVENTS;
     // Two degrees of freedom are spent: on the mean and on β.
     let factor = StudentsT::new(0.0, 1.0, n - 2.0).map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 * (1.0 + COVERAGE)));
@@ -402,6 +408,27 @@ mod tests {
             assert!((925..=975).contains(&covered), "{agree}: {covered}");
             assert!((least..most).contains(&worth), "{agree}: worth {worth} times the samples");
         }
+    }
+
+    #[test]
+    fn the_interval_covers_where_modes_disagree_in_samples_that_nobody_ran() {
+        const N: usize = 200;
+        const REPETITIONS: u64 = 300;
+        let covers = |number: u64| {
+            let mut rng = stream(7, number, &ActorId::new("test").unwrap(), "agreement");
+            // The fast mode misses one event of 34: half of the repetitions see no such sample.
+            let mut draw = || {
+                let full = rng.random::<f64>() < 0.17;
+                [full, full && rng.random::<f64>() < 33.0 / 34.0].map(super::number)
+            };
+            let pairs: Vec<[f64; 2]> = (0..N).map(|_| draw()).collect();
+            let more: Vec<f64> = (0..99 * N).map(|_| draw()[1]).collect();
+            let [low, high] = rate("x", &pairs, &more).unwrap().estimate.unwrap().interval_95;
+            low <= 0.17 && 0.17 <= high
+        };
+        let covered = (0..REPETITIONS).filter(|number| covers(*number)).count();
+        // Three standard errors of 1.3 % below 95 %.
+        assert!(covered >= 274, "{covered} of {REPETITIONS}");
     }
 
     #[test]
