@@ -612,8 +612,9 @@ fn suggestion(message: &str) -> String {
 
 /// Returns the deserialiser's message without the names of Rust types.
 fn without_rust_types(message: &str) -> String {
-    const WORDS: [(&str, &str); 5] = [
+    const WORDS: [(&str, &str); 6] = [
         ("u8", "a whole number from 0 to 255"),
+        ("usize", "a whole number, 0 or more"),
         ("u32", "a whole number, 0 or more"),
         ("u64", "a whole number, 0 or more"),
         ("f64", "a number"),
@@ -642,6 +643,14 @@ fn key_at(text: &str, offset: usize) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_names_no_type_of_rust() {
+        let pattern = "layers-deg = [0.0, 1.0]\nlayers-per-group = 1.5";
+        let text = format!("base = \"low-thw-overtake\"\n[sensors.rear-lidar.pattern]\n{pattern}\n");
+        let error = ScenarioFile::parse(Path::new("a.toml"), &text, &[]).unwrap_err().to_string();
+        assert!(error.contains("expected a whole number, 0 or more") && !error.contains("usize"), "{error}");
+    }
 
     #[test]
     fn an_error_names_the_parameters_that_the_value_uses_and_no_others() {

@@ -345,6 +345,8 @@ mod tests {
         for wrong in [&[0.5, 0.5, 0.5, 0.5][..], &[f32::NAN, 0.0, 0.0, 1.0], &[-0.5, 0.5, 0.5, 0.5], &[1.0]] {
             assert!(scores_from(wrong).is_err(), "{wrong:?}");
         }
+        let shown = scores_from(&[0.0; 4_000]).unwrap_err();
+        assert_eq!((shown.len(), &shown[8][..]), (9, "… 4000 values"), "a message shows a few");
     }
 
     #[test]
