@@ -123,7 +123,7 @@ pub struct TornLine {
 }
 
 /// Says that a run of a sample is not the run of the campaign.
-pub fn difference(outcome: &Outcome) -> String {
+fn difference(outcome: &Outcome) -> String {
     let (sample, controller) = (outcome.sample, &outcome.controller);
     format!(
         "sample {sample} with `{controller}` differs from the campaign's journal: the controller, a file that it imports or the \
@@ -378,6 +378,23 @@ impl Folder {
             }
         }
         Ok(Agreement::NotCompared)
+    }
+
+    /// Returns a message for each of these runs that is not the run of the campaign, to the last bit.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the journal cannot be read, or a line of it is damaged.
+    pub fn differences<'a>(&self, outcomes: impl IntoIterator<Item = &'a Outcome>) -> Result<Vec<String>, FolderError> {
+        let (outcomes, mut differences): (Vec<&Outcome>, _) = (outcomes.into_iter().collect(), Vec::new());
+        if outcomes.is_empty() || !self.has(JOURNAL)? {
+            return Ok(differences);
+        }
+        for record in self.records()? {
+            let record = record?;
+            let differs = |outcome: &&&Outcome| record.agreement(outcome) == Agreement::Differs;
+            differences.extend(outcomes.iter().filter(differs).map(|outcome| difference(outcome)));
+        }
+        Ok(differences)
     }
 
     /// Returns the wall time of each sample, in the order of the plan.

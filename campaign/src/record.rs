@@ -199,7 +199,7 @@ impl Record {
     /// Returns how the result of this sample compares with an outcome, to the last bit. An outcome of
     /// another sample is not compared.
     pub fn agreement(&self, outcome: &Outcome) -> Agreement {
-        let is_same = self.scenario == outcome.scenario && self.sample == outcome.sample;
+        let is_same = self.sample == outcome.sample && self.scenario == outcome.scenario;
         let arm = self.arms.iter().find(|arm| is_same && arm.controller == outcome.controller);
         match arm.map(|arm| arm.result.as_ref()) {
             None => Agreement::NotCompared,

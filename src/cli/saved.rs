@@ -4,9 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use closecall_campaign::arguments::{MemoryMib, TimeoutMs};
-use closecall_campaign::folder::difference;
 use closecall_campaign::rare::RareManifest;
-use closecall_campaign::record::Agreement;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::outcome::Outcome;
 use serde::Deserialize;
@@ -56,12 +54,7 @@ pub(super) fn difference_from_journal<'a>(
     saved: &SavedCampaign,
     outcomes: impl IntoIterator<Item = &'a Outcome>,
 ) -> Result<Option<String>, CliError> {
-    for outcome in outcomes {
-        if saved.folder().agreement(outcome)? == Agreement::Differs {
-            return Ok(Some(difference(outcome)));
-        }
-    }
-    Ok(None)
+    Ok(saved.folder().differences(outcomes)?.into_iter().next())
 }
 
 /// The limits of the processes of controllers.

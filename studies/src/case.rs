@@ -53,6 +53,9 @@ pub enum CausesError {
         /// The controller.
         controller: String,
     },
+    /// The sample fails otherwise than in the journal of the campaign.
+    #[error("{0}")]
+    Differs(String),
     /// No failing sample fails when it is run again, and some have no outcome.
     #[error(
         "no sample of `{scenario}` that fails with `{controller}` fails if it is run again; a run ended in an error: {message}"
@@ -141,6 +144,7 @@ impl CausesError {
             ) => FailureKind::Usage,
             Self::Map(MapError::Point { .. }) => FailureKind::Sample,
             Self::Write(_) => FailureKind::Io,
+            Self::Differs(_) => FailureKind::Validity,
             Self::Scenario(error) if error.is_io() => FailureKind::Io,
             Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
             Self::Scenario(_) => FailureKind::InvalidInput,
@@ -260,6 +264,18 @@ impl Case {
 
     fn failed(&self, source: SampleError) -> CausesError {
         CausesError::Sample { sample: self.sample, source }
+    }
+}
+
+/// Checks that samples of a campaign run again as the campaign has run them.
+///
+/// # Errors
+/// [`CausesError`] if a sample has no outcome or another one, or the journal cannot be read.
+pub(crate) fn check_repeats(saved: &SavedCampaign, cases: &[Case]) -> Result<(), CausesError> {
+    let outcomes: Vec<Outcome> = cases.iter().map(|case| case.run(&[])).collect::<Result<_, _>>()?;
+    match saved.folder().differences(&outcomes)?.into_iter().next() {
+        Some(difference) => Err(CausesError::Differs(difference)),
+        None => Ok(()),
     }
 }
 

@@ -184,8 +184,7 @@ fn errors_decide_about_a_comparison_with_a_baseline_and_hide_neither_a_fix_nor_a
     std::fs::write(folder.path().join("partly.sh"), PARTLY).unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let run = |name: &str, controller: &str, expected: i32| {
-        let words =
-            "campaign overtake-without-brake -n 12 --seed 1 --sensors ground-truth --no-gate --no-validity-checks \
+        let words = "campaign overtake-without-brake -n 12 --seed 1 --sensors ground-truth --no-gate --no-validity-checks \
              --record failures:0";
         let limit = if controller == "mis" { &[][..] } else { &["--controller-timeout-ms", "60000"] };
         let more = [&["--controller", controller, "--out", name], limit].concat();

@@ -333,6 +333,26 @@ fn a_recorded_run_that_is_not_the_run_of_the_campaign_makes_it_invalid() {
 }
 
 #[test]
+fn a_collision_that_happens_otherwise_when_it_runs_again_is_neither_explained_nor_minimized() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let [out, case] = ["out", "case.toml"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let words = "campaign low-thw-overtake -n 5 --seed 1 --sensors ground-truth --no-gate --record failures:0 --out";
+    let campaign = closecall(words.split(' ').chain([out.as_str(), "--controller", &library]));
+    stdout(&campaign, 0);
+    for words in [&["explain", &out, "4"][..], &["explain", &out], &["minimize", &out, "4", "--out", &case]] {
+        let output = with_fault(program().args(words), Some("slower"));
+        assert_eq!(code(&output), 7, "{words:?}: {}", stderr(&output));
+        assert!(
+            message(&output).contains("sample 4 with `lib:faulty` differs from the campaign's journal"),
+            "{words:?}"
+        );
+    }
+    assert!(!folder.path().join("case.toml").exists() && !folder.path().join("out/causes.json").exists());
+    stdout(&closecall(["explain", &out, "4"]), 0);
+}
+
+#[test]
 fn a_mirrored_run_that_takes_too_long_is_not_checked_and_no_defect_of_the_simulator() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));

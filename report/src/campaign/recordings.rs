@@ -1,12 +1,10 @@
 //! Recordings of selected samples of a campaign, and the page that shows them.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
 use closecall_campaign::action::{Action, CommandFor, Replay, SavedSample};
-use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE, difference};
-use closecall_campaign::record::{Agreement, Record};
+use closecall_campaign::folder::{Folder, RECORDINGS, RECORDINGS_PAGE};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::selection::{Chooser, Chosen, KindChooser, Selection};
 use closecall_scenarios::ScenarioFile;
@@ -96,9 +94,7 @@ pub(super) fn record(
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }
     let (mut recorded, mut entries) = (Recorded::default(), Vec::new());
-    let all = choose(&saved, scenarios, selection)?;
-    let records = records_of(&saved, &all)?;
-    for (name, chosen) in all {
+    for (name, chosen) in choose(&saved, scenarios, selection)? {
         create_folder(&path)?;
         let entry = match record_one(&saved, name, &chosen, command_for) {
             Ok(entry) => entry,
@@ -115,8 +111,6 @@ pub(super) fn record(
             }
         }
         for outcome in &entry.outcomes {
-            let differs = records.iter().any(|record| record.agreement(outcome) == Agreement::Differs);
-            recorded.differences.extend(differs.then(|| difference(outcome)));
             let key = (name.to_owned(), chosen.sample, outcome.controller.clone());
             recorded.paths.insert(key, format!("{RECORDINGS}/{}", entry.file));
         }
@@ -125,6 +119,7 @@ pub(super) fn record(
         recorded.samples.push(RecordedSample { scenario, sample: chosen.sample, reasons: chosen.reasons, path });
         entries.push(entry);
     }
+    recorded.differences = folder.differences(entries.iter().flat_map(|entry| &entry.outcomes))?;
     if !entries.is_empty()
         && let Err(error) = write_index(&path.join(RECORDINGS_PAGE), &entries, command_for)
     {
@@ -167,17 +162,6 @@ fn choose<'a>(
         }
     }
     Ok(all)
-}
-
-/// Returns the journal's records of the chosen samples.
-fn records_of(saved: &SavedCampaign, all: &[(&str, Chosen)]) -> Result<Vec<Record>, ReportError> {
-    if all.is_empty() {
-        return Ok(Vec::new());
-    }
-    let keys: BTreeSet<(&str, u64)> = all.iter().map(|(name, chosen)| (*name, chosen.sample)).collect();
-    let is_chosen = |record: &Record| keys.contains(&(record.scenario.as_str(), record.sample));
-    let records = saved.folder().records()?.filter(|record| record.as_ref().map_or(true, is_chosen));
-    Ok(records.collect::<Result<_, _>>()?)
 }
 
 fn record_one(

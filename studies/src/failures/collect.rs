@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{FailureRow, order, read_rows};
 use crate::attribution::attribute;
-use crate::case::{Case, CausesError, fails};
+use crate::case::{Case, CausesError, check_repeats, fails};
 use crate::explain::{Explanation, explain};
 
 /// Largest number of failures that a report attributes. The report of a large campaign then takes
@@ -65,6 +65,7 @@ pub fn explain_failures(
     if let Some(sample) = sample {
         let case = Case::of(saved, scenario, sample, None)?;
         let Some(explanation) = explain(&case)? else { return Err(passes(saved, &case)) };
+        check_repeats(saved, &[case])?;
         let mut failures = campaign_failures(saved)?;
         keep(&mut failures.rows, explanation.clone());
         return Ok((vec![explanation], failures));
@@ -76,11 +77,13 @@ pub fn explain_failures(
     let mut failures = campaign_failures(saved)?;
     let most = usize::try_from(most).unwrap_or(usize::MAX);
     let chosen = failures.rows.iter().filter(|row| scenario.is_none_or(|name| row.scenario == name)).take(most);
-    let mut explanations = Vec::new();
+    let (mut explanations, mut cases) = (Vec::new(), Vec::new());
     for row in chosen {
         let case = Case::of(saved, Some(&row.scenario), row.sample, Some(&row.controller))?;
         explanations.push(explain(&case)?.ok_or_else(|| passes(saved, &case))?);
+        cases.push(case);
     }
+    check_repeats(saved, &cases)?;
     for explanation in &explanations {
         keep(&mut failures.rows, explanation.clone());
     }

@@ -13,7 +13,7 @@ use super::trial::{Trial, WithoutOutcome};
 use super::twin::{Candidate, Twin, twin};
 use super::{grid, words};
 use crate::attribution::{Attribution, attribute};
-use crate::case::{Case, CausesError, fails};
+use crate::case::{Case, CausesError, check_repeats, fails};
 use crate::failures::passes;
 
 /// Number of steps of the grid beyond a failing value within which a passing one is sought.
@@ -160,7 +160,9 @@ pub(super) fn described(
 /// # Errors
 /// [`CausesError`] if the sample does not fail, or has no outcome.
 pub fn minimize_sample(saved: &SavedCampaign, case: &Case) -> Result<Minimized, CausesError> {
-    Ok(with_choice(saved.manifest(), minimize(case)?.ok_or_else(|| passes(saved, case))?))
+    let minimized = minimize(case)?.ok_or_else(|| passes(saved, case))?;
+    check_repeats(saved, std::slice::from_ref(case))?;
+    Ok(with_choice(saved.manifest(), minimized))
 }
 
 /// Names the controller of a case as the option `--controller` takes it.
