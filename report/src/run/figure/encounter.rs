@@ -90,8 +90,7 @@ pub fn encounter(films: &[Film]) -> String {
 
 fn title(svg: &mut Svg, films: &[Film]) {
     let style = |size, colour| TextStyle { size, colour, anchor: Anchor::Start };
-    let names = films.iter().map(Film::title).collect::<Vec<_>>().join(" and ");
-    svg.text([LEFT, 20.0], &format!("{} · {names}", Film::verdict_word(films)), style(13.0, INK));
+    svg.text([LEFT, 20.0], &format!("{} · {}", Film::verdict_word(films), names(films)), style(13.0, INK));
     for (row, film) in films.iter().enumerate() {
         let has_collision = film.worst_collision().is_some();
         let result = film.result().unwrap_or_else(|| film.headline());
@@ -100,6 +99,19 @@ fn title(svg: &mut Svg, films: &[Film]) {
             &format!("{}: {result}", film.arm_label()),
             style(11.0, if has_collision { "#c40018" } else { "#1e7d32" }),
         );
+    }
+}
+
+/// Returns the titles of the films. A pair of one sample has its scenario, its seed and its number
+/// once: the line has no room for them twice.
+fn names(films: &[Film]) -> String {
+    let outcomes = if let [baseline, tested] = films { baseline.outcome().zip(tested.outcome()) } else { None };
+    match outcomes {
+        Some((a, b)) if a.scenario == b.scenario && (a.seed, a.sample) == (b.seed, b.sample) => {
+            let arms = films.iter().map(Film::arm).collect::<Vec<_>>().join(" and ");
+            format!("{} · {arms} · seed {} · sample {}", a.scenario, a.seed, a.sample)
+        }
+        _ => films.iter().map(Film::title).collect::<Vec<_>>().join(" and "),
     }
 }
 

@@ -37,7 +37,7 @@ fn the_figure_of_the_papers_scenario_shows_all_five_moments_and_the_prevented_co
         "(c)",
         "(d)",
         "(e)",
-        "PREVENTED",
+        "PREVENTED · paper-figure · acc and mis · seed 1 · sample 0<",
         "R struck E from behind at ",
         "no collision",
         "m from E",

@@ -268,12 +268,19 @@ fn whole_run(films: &[FilmContents]) -> TimeAxis {
     TimeAxis::new().with_view_range(TimeRange { start: boundary(start), end: boundary(start + shown) })
 }
 
-/// Returns the length of the time axis of a run (s).
+/// Time between the labelled ticks of a run that is longer than [`BETWEEN_TICKS_S`] (s).
+const TICKS_S: f64 = 10.0;
+
+/// Returns the length of the time axis of a run (s). A tick just beyond the end has the room of its
+/// label, too.
 fn axis_length_s(start: Time, end: Time) -> f64 {
     let [from_s, to_s] = BETWEEN_TICKS_S;
     let length_s = (end - start).s();
     let is_without_second = start == Time::ZERO && length_s > from_s && length_s < to_s;
-    (1.0 + LABEL_ROOM) * if is_without_second { to_s } else { length_s }
+    let to_next_tick_s = (end.s() / TICKS_S).ceil() * TICKS_S - start.s();
+    let shown_s =
+        if is_without_second || to_next_tick_s < (1.0 + LABEL_ROOM) * length_s { to_next_tick_s } else { length_s };
+    (1.0 + LABEL_ROOM) * shown_s
 }
 
 /// Returns the log. It shows the texts only: their colours and words make other columns redundant.
@@ -305,6 +312,7 @@ mod tests {
         let length_s = |end_ms| axis_length_s(Time::ZERO, Time::from_ms(end_ms));
         assert!((length_s(60_000) - 61.8).abs() < 1e-9 && (length_s(6_000) - 6.18).abs() < 1e-9);
         assert!((length_s(8_900) - 10.3).abs() < 1e-9, "the tick of 10 s is on the axis");
+        assert!((length_s(19_860) - 20.6).abs() < 1e-9, "the label of 20 s has room");
         let recorded = axis_length_s(Time::from_ms(133_600), Time::from_ms(142_000));
         assert!((recorded - 1.03 * 8.4).abs() < 1e-9, "a multiple of 10 s may lie within");
     }

@@ -16,6 +16,8 @@ const NAMED: usize = 5;
 
 /// A label beside the road.
 struct Name {
+    /// Position of what it names, and of the label (m in the picture).
+    named_m: f64,
     x_m: f64,
     is_above: bool,
     text: String,
@@ -81,7 +83,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
             let moving = format!("{label} {:.1} m/s", state.speed_mps);
             let text = format!("{moving}{headway}");
             let width_m = canvas.label_m(text.chars().count());
-            is_shown.then_some(Name { x_m, is_above, text, shorter: vec![label, moving], width_m })
+            is_shown.then_some(Name { named_m: x_m, x_m, is_above, text, shorter: vec![label, moving], width_m })
         })
         .collect();
     names.extend(false_tracks(canvas, frame));
@@ -94,6 +96,8 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
         make_room(&mut of_row, room_m[1] - room_m[0], |letters| canvas.label_m(letters));
         of_row.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
         keep_apart(room_m, &mut of_row);
+        point(&mut of_row, room_m[1] - room_m[0], |letters| canvas.label_m(letters));
+        keep_apart(room_m, &mut of_row);
         placed.extend(of_row);
     }
     placed
@@ -104,6 +108,25 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
 fn is_neighbour(frame: &Frame, actor: usize) -> bool {
     frame.lead() == Some(actor) || frame.follower() == Some(actor)
 }
+
+/// Gives each name that lies beside its vehicle an arrow to it, as long as the row has room: it may
+/// lie over another vehicle.
+fn point(names: &mut [Name], room_m: f64, label_m: impl Fn(usize) -> f64) {
+    let mut free_m = room_m - names.iter().map(|name| name.width_m).sum::<f64>();
+    for name in names {
+        let half_m = 0.5 * name.width_m;
+        let text = format!("{}{}", arrow(name.named_m, [name.x_m - half_m, name.x_m + half_m]), name.text);
+        let wider_m = label_m(text.chars().count()) - name.width_m;
+        if text != name.text && !name.text.starts_with(ARROWS) && wider_m <= free_m {
+            free_m -= wider_m;
+            name.width_m += wider_m;
+            name.text = text;
+        }
+    }
+}
+
+/// The arrows with which a name begins.
+const ARROWS: [char; 2] = ['←', '→'];
 
 /// Returns an arrow to a vehicle beyond the labelled stretch, which begins a name.
 fn arrow(x_m: f64, [from_m, to_m]: [f64; 2]) -> &'static str {
@@ -123,7 +146,9 @@ fn false_tracks(canvas: &Canvas<'_>, frame: &Frame) -> Vec<Name> {
         |track: &&Track| is_shown_track(canvas.film, frame, track) && !belongs_to_a_vehicle(canvas.film, frame, track);
     let positions = frame.tracks.iter().filter(is_false).map(Track::x_m);
     let shown = positions.filter(|x_m| *x_m > labelled_m[0] && *x_m < labelled_m[1]);
-    shown.map(|x_m| Name { x_m, is_above: false, text: NO_VEHICLE.to_owned(), shorter: Vec::new(), width_m }).collect()
+    let name =
+        |x_m| Name { named_m: x_m, x_m, is_above: false, text: NO_VEHICLE.to_owned(), shorter: Vec::new(), width_m };
+    shown.map(name).collect()
 }
 
 /// Returns the headway that belongs to a vehicle, as it follows its speed.
@@ -183,6 +208,7 @@ mod tests {
     fn no_name_covers_another_and_none_leaves_its_room() {
         let width_m = |text: &str| 1.2 * text.chars().count() as f64 + 2.0;
         let name = |x_m, text: &str| Name {
+            named_m: x_m,
             x_m,
             is_above: true,
             text: text.to_owned(),
@@ -209,9 +235,36 @@ mod tests {
     }
 
     #[test]
+    fn a_name_that_lies_beside_its_vehicle_points_at_it_while_there_is_room() {
+        let named = |room_m: [f64; 2]| -> Vec<String> {
+            let name = |named_m, text: &str| Name {
+                named_m,
+                x_m: named_m,
+                is_above: true,
+                text: text.to_owned(),
+                shorter: Vec::new(),
+                width_m: text.chars().count() as f64,
+            };
+            let mut row = vec![name(-28.0, "third"), name(-21.0, "second"), name(20.0, "left-2")];
+            keep_apart(room_m, &mut row);
+            point(&mut row, room_m[1] - room_m[0], |letters| letters as f64);
+            keep_apart(room_m, &mut row);
+            assert!(
+                row.windows(2)
+                    .all(|pair| { pair[0].x_m + 0.5 * pair[0].width_m <= pair[1].x_m - 0.5 * pair[1].width_m + 1e-9 })
+            );
+            row.into_iter().map(|name| name.text).collect()
+        };
+        assert_eq!(named([-30.0, 40.0]), ["third", "second", "left-2"], "each lies above its vehicle");
+        assert_eq!(named([-2.0, 40.0]), ["← third", "← second", "left-2"], "the clock takes the room");
+        assert_eq!(named([-2.0, 17.0]), ["← third", "second", "left-2"], "there is room for one arrow");
+    }
+
+    #[test]
     fn a_full_row_loses_headways_before_speeds_and_speeds_before_names() {
         let names = |room_m: f64| -> Vec<String> {
             let name = |texts: [&str; 3]| Name {
+                named_m: 0.0,
                 x_m: 0.0,
                 is_above: false,
                 text: texts[2].to_owned(),
