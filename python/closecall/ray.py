@@ -22,6 +22,7 @@ import signal
 import socket
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -202,10 +203,12 @@ class Cluster:
         try:
             kind, answer = self._ray.get(ref)
         except self._ray.exceptions.RayError as error:
+            first = f"{len(samples)} samples from {samples[0]} on"
             if left > 0 and isinstance(error, self._lost):
+                # A controller may have ended its worker: what runs again is never silent.
+                warnings.warn(f"block {block} ({first}) runs again, because its worker was lost: {type(error).__name__}", stacklevel=1)
                 self._submit(block, work, samples, left - 1)
                 return None
-            first = f"{len(samples)} samples from {samples[0]} on"
             raise FileError(f"block {block} ({first}) has failed for good: {error}", exit_code=6) from error
         if kind == "refused":
             raise InputError(answer, exit_code=3)
