@@ -897,7 +897,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("curvature=\"0.001\"", "", "needs `curvature`"),
         ("curvature=\"0.001\"", "curvature=\"round\"", "`curvature` is `round`"),
         ("curvature=\"0.001\"", "curvature=\"inf\"", "`curvature` is `inf`"),
-        ("<arc curvature=\"0.001\"/>", "", "no geometry"),
+        ("<arc curvature=\"0.001\"/>", "", "`geometry`: its first element must be its shape, one of line, arc, spiral"),
         ("lanes>", "ways>", "no `lanes`"),
         ("laneSection", "section", "no `laneSection`"),
         ("right>", "left>", "no lanes on the right"),

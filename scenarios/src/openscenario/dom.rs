@@ -112,6 +112,9 @@ impl Node {
     }
 }
 
+/// The message about text that belongs to no element.
+const OUTSIDE: &str = "text is outside of the root element";
+
 /// Parses a document.
 ///
 /// Only the entities of XML itself are accepted: quick-xml expands none, and no document grows
@@ -128,7 +131,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
     }
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
-    let mut open: Vec<Node> = Vec::new();
+    let (mut open, mut root): (Vec<Node>, Option<Node>) = (Vec::new(), None);
     let (mut count, mut line, mut counted) = (0, 1, 0);
     loop {
         let event = reader.read_event();
@@ -143,6 +146,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
         match event {
             Err(error) => return fail(format!("it is not an XML document: {error}")),
             Ok(Event::DocType(_)) => return fail("a document type declaration is not allowed".to_owned()),
+            Ok(Event::Start(_)) if root.is_some() => return fail("the document has a second root element".to_owned()),
             Ok(Event::Start(start)) => {
                 count += 1;
                 if open.len() >= MOST_DEPTH || count > MOST_ELEMENTS {
@@ -156,8 +160,10 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
             Ok(Event::Text(part)) => match (part.decode(), open.last_mut()) {
                 (Ok(part), Some(node)) => node.text.push_str(&part),
                 (Err(error), _) => return fail(format!("it is not text: {error}")),
-                (Ok(_), None) => {}
+                (Ok(part), None) if part.trim_start_matches('\u{feff}').trim().is_empty() => {}
+                (Ok(_), None) => return fail(OUTSIDE.to_owned()),
             },
+            Ok(Event::CData(_) | Event::GeneralRef(_)) if open.is_empty() => return fail(OUTSIDE.to_owned()),
             Ok(Event::CData(part)) => {
                 if let Some(node) = open.last_mut() {
                     node.text.push_str(&String::from_utf8_lossy(&part));
@@ -176,10 +182,13 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Node, ImportError> {
             }
             Ok(Event::End(_)) => match (open.pop(), open.last_mut()) {
                 (Some(done), Some(parent)) => parent.children.push(done),
-                (Some(done), None) => return Ok(done),
+                (Some(done), None) => root = Some(done),
                 (None, _) => return fail("an element ends that did not begin".to_owned()),
             },
-            Ok(Event::Eof) => return fail("the document ends before its root element does".to_owned()),
+            Ok(Event::Eof) => match root {
+                Some(root) => return Ok(root),
+                None => return fail("the document ends before its root element does".to_owned()),
+            },
             Ok(_) => {}
         }
     }
@@ -225,6 +234,27 @@ pub(super) fn number(path: &Path, node: &Node, name: &str) -> Result<f64, Import
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_document_has_one_root_and_nothing_beside_it() {
+        let parsed =
+            |text: &str| parse(Path::new("a.xml"), text).map(|root| root.name).map_err(|error| error.to_string());
+        let around = "\u{feff}<?xml version=\"1.0\"?>\n<!-- one -->\n<a><b/></a>\n<!-- two --><?three?>\n";
+        assert_eq!(parsed(around), Ok("a".to_owned()));
+        for (text, line, word) in [
+            ("<a/>\n<b/>", 2, "a second root element"),
+            ("<a/>\n<a>", 2, "a second root element"),
+            ("<a/>\n\nand more", 3, "text is outside of the root element"),
+            ("before <a/>", 1, "text is outside of the root element"),
+            ("<a/><![CDATA[x]]>", 1, "text is outside of the root element"),
+            ("<a/>&lt;", 1, "text is outside of the root element"),
+            ("<a/>\n</a>", 2, "it is not an XML document"),
+            ("<!-- nothing -->", 1, "ends before its root element does"),
+        ] {
+            let message = parsed(text).unwrap_err();
+            assert!(message.contains(word) && message.contains(&format!("a.xml:{line}")), "{text}: {message}");
+        }
+    }
 
     #[test]
     fn an_element_is_on_the_line_on_which_its_start_tag_begins() {

@@ -1,7 +1,7 @@
 //! The part of an OpenDRIVE road that a scenario of parallel lanes has: driving lanes of one
 //! direction, width, curvature, speed.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use closecall_traffic::{AccelerationLane, Alignment, Road};
@@ -268,7 +268,13 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         return Err(along.error(path, message));
     }
     notes.extend(left_out(section, side));
-    if along.all("lane").any(changes_width) {
+    if let Some(lane) = inner_lanes(along, &driving).find(|lane| lane.child("width").is_none())
+        && let Some(border) = lane.child("border")
+    {
+        return Err(border.error(path, "the width of a lane is read from `width`, and it has none"));
+    }
+    let entry_id = entry.map(|entry| entry.id);
+    if widths_change(lanes.all("laneSection").filter_map(|section| section.child(side)), &driving, entry_id) {
         notes.push(format!("lanes whose width changes: each has the width at {s_m} m"));
     }
     let widths_m: Vec<f64> = driving.iter().map(|lane| lane.width_in_scenario_m(used_lane, s_m, &mut notes)).collect();
@@ -438,10 +444,29 @@ fn curvature(
     Ok((0.0, None))
 }
 
-/// Returns whether a driving lane does not have the same width everywhere.
-fn changes_width(lane: &Node) -> bool {
-    let is_driving = lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
-    is_driving && changes(lane, "width")
+/// Returns the lanes from the reference line to the outermost driving lane: their widths say where the
+/// driving lanes are.
+fn inner_lanes<'a>(along: &'a Node, driving: &[DrivingLane]) -> impl Iterator<Item = &'a Node> {
+    let outermost = driving.iter().map(|lane| lane.id.unsigned_abs()).max().unwrap_or_default();
+    along.all("lane").filter(move |lane| value(lane, "id").abs() <= f64::from(outermost))
+}
+
+/// Returns whether a lane does not have the same width everywhere on one side of all sections. The
+/// acceleration lane narrows to nothing, as in the scenario.
+fn widths_change<'a>(
+    sides: impl Iterator<Item = &'a Node>,
+    driving: &[DrivingLane],
+    acceleration_lane: Option<i32>,
+) -> bool {
+    let mut firsts: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut lanes = sides.flat_map(|along| inner_lanes(along, driving));
+    lanes.any(|lane| {
+        let id = lane.raw("id").unwrap_or_default().trim();
+        let width_m = width_m(lane, 0.0);
+        let is_other = *firsts.entry(id).or_insert(width_m) != width_m;
+        acceleration_lane.is_none_or(|entry| value(lane, "id") != f64::from(entry))
+            && (is_other || changes(lane, "width"))
+    })
 }
 
 /// Returns whether the polynomials of a name do not have the same value everywhere.
@@ -563,6 +588,40 @@ mod tests {
         let note = "lane -3 with a width of 6 m at 0 m, and a lane of a scenario has a width of 2.5 to 5 m: \
                     it has the 3.5 m of the ego's lane";
         assert_eq!(wide.notes, ["lanes that a scenario does not have: `median`", note]);
+    }
+
+    #[test]
+    fn a_width_that_changes_is_noted_wherever_it_moves_the_lanes() {
+        let lane = |id: i32, kind: &str, widths: &str| format!("<lane id=\"{id}\" type=\"{kind}\">{widths}</lane>");
+        let (narrow, wide) = ("<width a=\"3\"/>", "<width a=\"3.5\"/>");
+        let widens = "<width a=\"3\"/><width sOffset=\"50\" a=\"3\" b=\"0.01\"/>";
+        let imported = |sections: &[&[String]]| {
+            let section = |(index, lanes): (usize, &&[String])| {
+                format!("<laneSection s=\"{}\"><right>{}</right></laneSection>", 300 * index, lanes.concat())
+            };
+            let text = format!(
+                "<OpenDRIVE><road id=\"7\" length=\"900\"><planView><geometry x=\"0\" y=\"0\" hdg=\"0\" length=\"900\">\
+                 <line/></geometry></planView><lanes>{}</lanes></road></OpenDRIVE>",
+                sections.iter().enumerate().map(section).collect::<String>()
+            );
+            read(Path::new("road.xodr"), &text, &UsedRoad::Only)
+                .map(|road| road.notes)
+                .map_err(|error| error.to_string())
+        };
+        let two = |second: &str| [lane(-1, "driving", narrow), lane(-2, "driving", second)];
+        let note = Ok(vec!["lanes whose width changes: each has the width at 0 m".to_owned()]);
+        assert_eq!(imported(&[&two(narrow), &two(narrow)]), Ok(vec![]));
+        assert_eq!(imported(&[&two(narrow), &two(wide)]), note);
+        assert_eq!(imported(&[&two(narrow), &two(widens)]), note);
+        // What is beside the driving lanes moves none of them; what is between them and the reference line does.
+        let beside = |at: i32, widths: &str| {
+            let driving = if at == -1 { -2 } else { -1 };
+            imported(&[&[lane(driving, "driving", narrow), lane(at, "none", widths)]])
+        };
+        assert_eq!(beside(-2, widens), Ok(vec![]));
+        assert_eq!(beside(-1, widens), note);
+        let border = beside(-1, "<border a=\"-2\"/>").unwrap_err();
+        assert!(border.contains("`border`: the width of a lane is read from `width`, and it has none"), "{border}");
     }
 
     #[test]

@@ -36,6 +36,8 @@ const MOST_LANE: f64 = 1_000.0;
 /// assumption; 1e-6 to 0.05, and 0.01 to 5, are plausible.
 const APART: (f64, f64) = (0.01, 1.0);
 
+/// The shapes of a piece of the reference line.
+const SHAPES: [&str; 5] = ["line", "arc", "spiral", "poly3", "paramPoly3"];
 /// The coefficients of a polynomial of third degree.
 const CUBIC: [&str; 4] = ["a", "b", "c", "d"];
 /// The coefficients of a curve, along the road and across.
@@ -135,6 +137,15 @@ impl Checker<'_> {
         }
     }
 
+    /// Refuses an element that does not begin after the element before it.
+    fn ascends(&self, (node, name): (&Node, &str), does_ascend: bool) -> Result<(), ImportError> {
+        let stated = node.raw(name).unwrap_or("0");
+        match does_ascend {
+            true => Ok(()),
+            false => Err(node.error(self.path, format!("`{name}` is {stated}, not after the element before it"))),
+        }
+    }
+
     /// Checks the pieces of the reference line, each alone and with the piece after it.
     fn plan(&self, plan: &Node) -> Result<(), ImportError> {
         let mut before: Option<(&Node, f64)> = None;
@@ -145,8 +156,12 @@ impl Checker<'_> {
                 self.within(geometry, name, [-MOST_COORDINATE_M, MOST_COORDINATE_M], " m")?;
             }
             self.within(geometry, "hdg", [-MOST_HEADING_RAD, MOST_HEADING_RAD], " rad")?;
-            for shape in &geometry.children {
-                self.shape(shape, length_m)?;
+            match geometry.children.first().filter(|shape| SHAPES.contains(&shape.name.as_str())) {
+                Some(shape) => self.shape(shape, length_m)?,
+                None => {
+                    let message = format!("its first element must be its shape, one of {}", SHAPES.join(", "));
+                    return Err(geometry.children.first().unwrap_or(geometry).error(self.path, message));
+                }
             }
             if let Some((other, other_m)) = before {
                 self.follows(other, other_m, geometry)?;
@@ -270,7 +285,9 @@ impl Checker<'_> {
         let pieces: Vec<&Node> = parent.all(name).collect();
         let mut starts_m = Vec::with_capacity(pieces.len());
         for piece in &pieces {
-            starts_m.push(self.place(piece, from.0)?);
+            let start_m = self.place(piece, from.0)?;
+            self.ascends((piece, from.0), starts_m.last().is_none_or(|last_m| *last_m <= start_m))?;
+            starts_m.push(start_m);
         }
         for (index, piece) in pieces.iter().enumerate() {
             let coefficients = self.coefficients(piece, CUBIC)?;
@@ -300,7 +317,9 @@ impl Checker<'_> {
         let sections: Vec<&Node> = lanes.all("laneSection").collect();
         let mut starts_m = Vec::with_capacity(sections.len());
         for section in &sections {
-            starts_m.push(self.place(section, "s")?);
+            let start_m = self.place(section, "s")?;
+            self.ascends((section, "s"), starts_m.last().is_none_or(|last_m| *last_m < start_m))?;
+            starts_m.push(start_m);
         }
         for (index, section) in sections.iter().enumerate() {
             let end_m = starts_m.get(index + 1).copied().unwrap_or(self.length_m);
@@ -424,6 +443,27 @@ mod tests {
             ("s=\"150\" a=", "s=\"300\" a=", "`s` is 300; 0 to 200 m, the length of the road"),
             ("a=\"0.04\"", "a=\"4\"", "`a` is 4; a superelevation has -1 to 1 rad"),
             ("b=\"0.001\"", "b=\"-0.1\"", "`width`: after 200 m it is -16.5; a width has 0 to 100 m"),
+            ("<spiral", "<bezier", "`bezier`: its first element must be its shape, one of line, arc, spiral, poly3"),
+            (
+                "<spiral curvStart=\"0\" curvEnd=\"0.001\"/>",
+                "",
+                "`geometry`: its first element must be its shape, one of line, arc, spiral, poly3",
+            ),
+            (
+                "s=\"150\" a=\"16.5\" b=\"0\" c=\"1e-4\" d=\"0\"/>",
+                "s=\"150\"/><elevation s=\"140\"/>",
+                "`s` is 140, not after",
+            ),
+            (
+                "<laneSection s=\"0\">",
+                "<laneSection s=\"0\"/><laneSection s=\"0\">",
+                "`s` is 0, not after the element before it",
+            ),
+            (
+                "<laneSection s=\"0\">",
+                "<laneSection s=\"90\"/><laneSection s=\"50\">",
+                "`s` is 50, not after the element before it",
+            ),
             ("id=\"-1\"", "id=\"-1.5\"", "`id` is -1.5; a whole number from -1000 to 1000"),
         ] {
             assert!(ROAD.contains(right), "{right}");

@@ -906,7 +906,7 @@ impl<'a> Storyboard<'a> {
 
     /// Returns the position along the road (m) and the lane of a position in the plane.
     fn in_plane(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(f64, i32), ImportError> {
-        let point = self.on_road(node)?;
+        let point = self.on_road(node, None)?;
         let heading_rad = self.reader.number_or(node, "h", 0.0)?;
         if let Some(line) = self.road.line
             && !(line.angle_rad(heading_rad, point.s_m).abs() <= MOST_START_ANGLE_RAD)

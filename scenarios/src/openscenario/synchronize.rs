@@ -192,7 +192,7 @@ impl Storyboard<'_> {
     /// Returns the place of a target along the road (m).
     fn target_m(&self, node: &Node, name: &str) -> Result<f64, ImportError> {
         let position = self.reader.only(self.reader.child(node, &[name])?)?;
-        let point = self.on_road(position)?;
+        let point = self.on_road(position, None)?;
         let lane = self.road.lane_near(point.t_m);
         let beside_m = lane.map_or(f64::INFINITY, |lane| (point.t_m - self.road.centres_m[lane]).abs());
         if !lane.is_some_and(|lane| beside_m <= self.road.half_width_m(lane)) {

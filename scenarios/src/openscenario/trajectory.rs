@@ -110,7 +110,8 @@ impl Storyboard<'_> {
                 return Err(reader.error(vertex, "`time` must grow from vertex to vertex"));
             }
             let position = reader.only(reader.child(vertex, &["Position"])?)?;
-            points.push(Point { at_s, on_road: self.on_road(position)? });
+            let before_m = points.last().map(|last| last.on_road.s_m);
+            points.push(Point { at_s, on_road: self.on_road(position, before_m)? });
         }
         match points.len() {
             0 | 1 => Err(reader.error(line, "it needs two vertices or more")),
@@ -118,11 +119,11 @@ impl Storyboard<'_> {
         }
     }
 
-    /// Returns where a position lies on the road.
+    /// Returns where a position lies on the road. `before_m` is the place of a position before it (m).
     ///
     /// # Errors
     /// [`ImportError`] for another kind of position, or if the road has no place in the plane.
-    pub(super) fn on_road(&self, position: &Node) -> Result<RoadPoint, ImportError> {
+    pub(super) fn on_road(&self, position: &Node, before_m: Option<f64>) -> Result<RoadPoint, ImportError> {
         let reader = &self.reader;
         match position.name.as_str() {
             "WorldPosition" => {
@@ -130,7 +131,7 @@ impl Storyboard<'_> {
                     let message = "a position in the plane needs a road whose course is imported, with its start";
                     return Err(reader.error(position, message));
                 };
-                Ok(line.road_point(reader.number(position, "x")?, reader.number(position, "y")?))
+                Ok(line.road_point(reader.number(position, "x")?, reader.number(position, "y")?, before_m))
             }
             "LanePosition" => {
                 let (s_m, lane) = self.on_lane(position)?;
