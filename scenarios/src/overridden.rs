@@ -74,7 +74,7 @@ mod tests {
     fn overridden(settings: &[&str]) -> Vec<String> {
         let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
         let text = library::text("low-thw-overtake").unwrap();
-        let text = text.replacen("\nduration-s", "\nexpects-share = 0.95\nduration-s", 1);
+        let text = text.replacen("\nduration-s", "\nexpects-share = 0.95\nfunction = \"mis\"\nduration-s", 1);
         let file = ScenarioFile::parse(Path::new("a.toml"), &text, &settings).unwrap();
         // What a saved campaign reads is the text.
         let again = ScenarioFile::parse(Path::new("a.toml"), file.text(), &[]).unwrap();
