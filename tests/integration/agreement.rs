@@ -183,6 +183,8 @@ fn verdict_of(part: &Path, records: &[Record], gates: &[String], out: &Path) -> 
     let failures = attribute(&junit, "failures");
     assert_eq!(failures, junit.matches("<failure ").count(), "{context}");
     assert_eq!(failures, if is_measured { 0 } else { failed }, "{context}: {junit}");
+    // A gate that is met has its value, too.
+    assert_eq!(junit.matches("<system-out>met: ").count(), met, "{context}: {junit}");
     let is_green = failures + attribute(&junit, "errors") == 0;
     assert_eq!(is_green, code(&human) == 0, "{context}: {junit}");
     assert!(page.contains(&format!("<title>{word}: ")), "{context}");

@@ -88,8 +88,6 @@ fn the_verdict_for_ci_servers_is_valid_by_the_schema_of_xunit() {
     });
     assert_eq!(against_schema(&xml), Vec::<String>::new(), "{xml}");
     assert!(xml.contains("<testsuite name=\"low-thw-overtake\"") && xml.contains("time=\"1.250\""), "{xml}");
-    // A gate that is met has its value, too.
-    assert!(xml.contains("<system-out>met: low-thw-overtake: MIS-2: share of the samples in which "), "{xml}");
     // The cases of a suite have its time together.
     let suite = xml.split("<testsuite ").find(|suite| suite.starts_with("name=\"low-thw-overtake\"")).unwrap();
     let time_s = |part: &str| part.split("time=\"").nth(1)?.split('"').next()?.parse::<f64>().ok();
