@@ -434,7 +434,7 @@ fn judge_validity(summary: &Summary, checks: &CheckCounts, max_flip_rate: f64, f
     if checks.flips > allowed { findings.add(Decision::Invalid, sentence) } else { findings.note(sentence) }
 }
 
-/// Returns the scenarios and arms of which most runs that were chosen for the validity checks have no
+/// Returns the scenarios and arms in which most runs that were chosen for the validity checks have no
 /// result, in words.
 fn without_check(summary: &Summary) -> Vec<String> {
     let arms = |(name, counts): &(String, Counts)| -> Vec<String> {
