@@ -130,9 +130,9 @@ fn shape(message: &str) -> String {
     in_one_number(&without_numbers(&without_random_names(message)))
 }
 
-/// Returns true if the shapes of two messages are the same. A quote of a fixed length ends, with `…`,
-/// in different places, because its numbers are of different lengths: the shorter quote is then the
-/// beginning of the longer one.
+/// Returns true if the shapes of two messages are the same. A quote of a fixed length ends, with
+/// `…`, in different places, because its numbers are of different lengths: the shorter quote is then
+/// the beginning of the longer one.
 fn have_one_shape(one: &str, other: &str) -> bool {
     match (one.split_once('…'), other.split_once('…')) {
         (Some((quote, end)), Some((other_quote, other_end))) => {

@@ -146,8 +146,8 @@ pub(crate) fn gate_line(gate: &GateResult) -> String {
     format!("{}: {scenario}: {mark}{} [{}{source}]", gate.standing().word(), gate_words(gate), gate.expression)
 }
 
-/// Returns the line of a gate on the probability of a collision in a scenario, in the words of every
-/// gate.
+/// Returns the line of a gate on the probability of a collision in a scenario, in the words of
+/// every gate.
 pub(crate) fn probability_line(scenario: &str, finding: &Finding, summary: &Summary) -> String {
     let words = summary.tested(scenario).map_or_else(String::new, |counts| finding.words(counts));
     format!("{}: {scenario}: {words} [{}]", finding.standing().word(), finding.criterion())

@@ -91,7 +91,7 @@ pub struct Child {
     answered: u64,
     /// The file that tells the resident memory of the process, if the system has one.
     resident: Option<File>,
-    /// True from the first line on that it cannot be given, because it has closed its standard input.
+    /// True from the first line on that cannot be written: the process has closed its input.
     has_closed_input: Arc<AtomicBool>,
     /// When the memory of its descendants was looked at last.
     tree_looked: Instant,

@@ -1,6 +1,7 @@
 //! Why a program that is there cannot be started. The system answers "No such file or directory" if
 //! the *interpreter* of a script is absent, "Exec format error" if a script names none, and
-//! "Permission denied" of a file without the right to run. A bare name is looked for in `PATH` alone.
+//! "Permission denied" of a file without the right to run. A bare name is looked for in `PATH`
+//! alone.
 
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::PermissionsExt;
