@@ -6,8 +6,8 @@ use closecall_controllers::{
 };
 use closecall_sensors::Sensors;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Environment, GRAVITY_MPS2, LateralPath, Num, PHYSICS_STEP, Parameters, Problem, Range,
-    Road, Time, Vehicle, VehicleState,
+    ActorId, Check, ConfigError, Environment, GRAVITY_MPS2, KeyPath, LateralPath, Num, PHYSICS_STEP, Parameters,
+    Problem, Range, Road, Time, Vehicle, VehicleState,
 };
 
 use crate::coverage::CoveragePlan;
@@ -163,7 +163,10 @@ impl ScenarioConfig {
             requirement.starts_with(|c: char| c.is_ascii_alphanumeric()) && requirement.chars().all(is_allowed)
         };
         for (index, requirement) in self.requirements.iter().enumerate() {
-            let at = |problem| Err(ConfigError::new("requirements", problem).within_index(index));
+            let at = |problem| {
+                let error = ConfigError { path: KeyPath::default(), problem };
+                Err(error.within_index(index).within("requirements"))
+            };
             if !is_identifier(requirement) {
                 let allowed =
                     "the names of letters, digits, `-`, `.` and `_`, starting with a letter or digit,".to_owned();

@@ -653,6 +653,15 @@ mod tests {
     }
 
     #[test]
+    fn a_wrong_element_of_a_list_is_named_by_its_number() {
+        let text =
+            "base = \"low-thw-overtake\"\nname = \"a\"\ndescription = \"a\"\nrequirements = [\"MIS-1\", \"MIS 2\"]\n";
+        let file = ScenarioFile::parse(Path::new("a.toml"), text, &[]).unwrap();
+        let error = file.check().unwrap_err().to_string();
+        assert!(error.contains("a.toml:4: `requirements[1]` is `MIS 2`"), "{error}");
+    }
+
+    #[test]
     fn an_error_names_the_parameters_that_the_value_uses_and_no_others() {
         let setting = "actor.rear.start.behind.gap-m=-5".parse().unwrap();
         let text = super::super::library::text("low-thw-overtake").unwrap();

@@ -14,7 +14,7 @@ use std::f64::consts::SQRT_2;
 use std::sync::{Mutex, PoisonError};
 
 use closecall_traffic::statistics::normal::erfc_inv;
-use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range, Time, maths};
+use closecall_traffic::{CONTROL_STEP, Check, ConfigError, KeyPath, Num, Parameters, Problem, Range, Time, maths};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -327,14 +327,14 @@ impl LidarKindConfig {
                 Problem::WrongLength { value: layers as u64, allowed: "1 to 128" },
             ));
         }
-        for (index, pair) in self.layers_deg.windows(2).enumerate() {
-            if !(pair[0] < pair[1]) {
-                let problem = Problem::OutOfRange { value: pair[1], allowed: Range::above(pair[0], MAX_ELEVATION_DEG) };
-                return Err(ConfigError::new("layers-deg", problem).within_index(index + 1));
+        let mut allowed = Range::closed(-MAX_ELEVATION_DEG, MAX_ELEVATION_DEG);
+        for (index, &value) in self.layers_deg.iter().enumerate() {
+            if !allowed.contains(value) {
+                let problem = Problem::OutOfRange { value, allowed };
+                let error = ConfigError { path: KeyPath::default(), problem };
+                return Err(error.within_index(index).within("layers-deg"));
             }
-        }
-        for elevation_deg in &self.layers_deg {
-            number(*elevation_deg, "layers-deg", Range::closed(-MAX_ELEVATION_DEG, MAX_ELEVATION_DEG))?;
+            allowed = Range::above(value, MAX_ELEVATION_DEG);
         }
         let group = self.layers_per_group.unwrap_or(layers);
         if group == 0 || !layers.is_multiple_of(group) || layers / group > GROUPS {

@@ -117,7 +117,9 @@ fn a_wrong_value_is_answered_with_key_and_allowed_range() {
     let error = checked(|config| config.half_field_deg = 66.6).unwrap_err();
     assert!(error.starts_with("`half-field-deg` contradicts `azimuth-step-deg`: "), "{error}");
     let error = checked(|config| config.layers_deg.swap(3, 4)).unwrap_err();
-    assert!(error.contains("above -2.185"), "{error}");
+    assert!(error.starts_with("`layers-deg[4]` is") && error.contains("above -2.185"), "{error}");
+    let error = checked(|config| config.layers_deg[0] = f64::NAN).unwrap_err();
+    assert_eq!(error, "`layers-deg[0]` is NaN, but a number from -45 to 45 is needed");
     let error = checked(|config| config.layers_per_group = Some(5)).unwrap_err();
     assert!(error.contains("1 to 4 groups"), "{error}");
     let error = checked(|config| config.layers_deg = Vec::new()).unwrap_err();
