@@ -20,7 +20,13 @@ fn flaws_are_reported_and_unusable_rows_end_with_3() {
     assert_eq!(report["flaws"]["jumps"]["count"], 0);
     let text = fs::read_to_string(csv).unwrap();
     let mut lines: Vec<&str> = text.lines().collect();
+    // A row that is repeated in all values is left out.
     lines.insert(100, lines[99]);
+    fs::write(csv, lines.join("\n") + "\n").unwrap();
+    let report = json(&closecall(["traffic", "inspect", csv, "--format", "json"]), 0);
+    assert_eq!((report["continuity"]["repeated_rows"].as_u64(), report["usable"].as_bool()), (Some(1), Some(true)));
+    let other_class = lines[99].replacen("car", "truck", 1);
+    lines[100] = &other_class;
     fs::write(csv, lines.join("\n") + "\n").unwrap();
     let output = closecall(["traffic", "inspect", csv, "--format", "json"]);
     assert!(stderr(&output).contains("own.csv, line 101: frame 98"), "{}", stderr(&output));

@@ -105,6 +105,10 @@ impl TrackBuilder {
         let rows = self.open.entry(key).or_default();
         let mut begins_after_gap = rows.is_empty();
         if let Some(before) = rows.last() {
+            if row.repeats(before) {
+                self.continuity.repeated_rows += 1;
+                return Ok(());
+            }
             let step = step(before, &row, self.clock)?;
             let missing = if step == Step::Gap { bridge(before, &row, self.clock) } else { Some(Vec::new()) };
             let is_jump = is_jump(before, &row);

@@ -55,7 +55,7 @@ const MAX_REFERENCES: usize = 20;
 const FEW_JUMPS: usize = 0;
 
 /// A position, as the layout states it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Position {
     /// In a plane; the point is the centre of the vehicle's box.
     Plane {
@@ -95,7 +95,7 @@ impl Position {
 }
 
 /// A row whose vehicle has an index instead of a number.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CollectedRow {
     pub(super) vehicle: u32,
     pub(super) time: Time,
@@ -185,12 +185,12 @@ impl Collected {
         let rows: Vec<CollectedRow> = items.iter().filter_map(|item| item.as_ref().ok()).copied().collect();
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by_key(|&index| (rows[index].vehicle, rows[index].time, rows[index].line));
-        let mut doubled = take_doubled(&rows, &mut order, &numbers);
+        let Doubled { mut contrary, repeated } = take_doubled(&rows, &mut order, &numbers);
         let period = period(&rows, &order);
         let road = check_steps((&rows, &order), (facts.layout, facts.clock))
             .and_then(|()| infer_road(&rows, &order, facts.lane_width_m, facts.clock));
         // Numbers of several vehicles are a reason why the traffic shows no road.
-        let road = road.map_err(|error| doubled.pop_first().map_or(error, |(_, first)| first))?;
+        let road = road.map_err(|error| contrary.pop_first().map_or(error, |(_, first)| first))?;
         notes.extend(road.iter().flat_map(InferredRoad::warnings));
         let is_in_doubt = road.as_ref().is_some_and(InferredRoad::is_in_doubt);
         let is_mirrored = road.as_ref().is_some_and(InferredRoad::is_mirrored);
@@ -261,6 +261,9 @@ impl Collected {
             // A recording has no lane changes of a single step, so that this one splits the track.
             placed[index] = placed[index].map(|row| Row { clock: Clock::Continuous, ..row });
         }
+        for Repetition { index, of } in repeated {
+            placed[index] = placed[of].map(|row| Row { line: rows[index].line, ..row });
+        }
         let single_steps = jumps.len() - exchanged_rows;
         if facts.clock == Clock::Simulated && single_steps > FEW_JUMPS {
             notes.push(format!(
@@ -272,7 +275,7 @@ impl Collected {
         let items = items.into_iter().filter_map(|item| match item {
             Ok(_) => {
                 let (index, row) = placed.next()?;
-                doubled.remove(&index).map(Err).or_else(|| row.map(Ok))
+                contrary.remove(&index).map(Err).or_else(|| row.map(Ok))
             }
             Err(error) => Some(Err(error)),
         });
@@ -378,27 +381,47 @@ fn check_steps((rows, order): (&[CollectedRow], &[usize]), (layout, clock): (Lay
     steps.check(layout).map_err(ReadError::of_file)
 }
 
+/// A row with the values of another one.
+struct Repetition {
+    index: usize,
+    /// Index of the other row.
+    of: usize,
+}
+
+/// The rows of vehicles that already have a row at that time.
+#[derive(Default)]
+struct Doubled {
+    /// The problem of each row with other values, by its index.
+    contrary: BTreeMap<usize, ReadError>,
+    repeated: Vec<Repetition>,
+}
+
 /// Takes the rows of a vehicle that already has a row at that time out of `order`, which is sorted by vehicle and
-/// time, and returns the problem of each of them by its index.
-fn take_doubled(rows: &[CollectedRow], order: &mut Vec<usize>, numbers: &[u64]) -> BTreeMap<usize, ReadError> {
+/// time.
+fn take_doubled(rows: &[CollectedRow], order: &mut Vec<usize>, numbers: &[u64]) -> Doubled {
     let period = period(rows, order);
     let start = rows.iter().map(|row| row.time).min().unwrap_or(Time::ZERO);
-    let mut doubled = BTreeMap::new();
-    let mut kept: Option<&CollectedRow> = None;
+    let mut doubled = Doubled::default();
+    let mut kept: Option<usize> = None;
     order.retain(|&index| {
         let row = &rows[index];
-        let before = kept.filter(|kept| (kept.vehicle, kept.time) == (row.vehicle, row.time));
-        let Some(CollectedRow { position, line: first_line, .. }) = before.copied() else {
-            kept = Some(row);
+        let at_once = |of: &usize| (rows[*of].vehicle, rows[*of].time) == (row.vehicle, row.time);
+        let Some(of) = kept.filter(at_once) else {
+            kept = Some(index);
             return true;
         };
+        let CollectedRow { position, line: first_line, .. } = rows[of];
+        if rows[of] == (CollectedRow { line: first_line, ..*row }) {
+            doubled.repeated.push(Repetition { index, of });
+            return false;
+        }
         let (vehicle, frame) = (numbers[row.vehicle as usize], steps(row.time - start, period));
         let problem = if position.is_at(row.position) {
             TrajectoryFileProblem::DuplicateRow { vehicle, frame, first_line }
         } else {
             TrajectoryFileProblem::SharedNumber { vehicle, frame, first_line }
         };
-        doubled.insert(index, ReadError::new(row.line, problem));
+        doubled.contrary.insert(index, ReadError::new(row.line, problem));
         false
     });
     doubled

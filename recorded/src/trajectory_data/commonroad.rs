@@ -355,6 +355,10 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
         self.mapped.doubt_of_turns().is_some()
     }
 
+    fn off_road_percent(&self) -> Option<f64> {
+        self.mapped.off_road_percent()
+    }
+
     fn map_doubt(&self) -> Option<String> {
         self.mapped.doubt_of_place()
     }

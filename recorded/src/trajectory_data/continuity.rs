@@ -11,6 +11,7 @@
 use std::collections::BTreeMap;
 
 use closecall_traffic::Time;
+use closecall_traffic::words::counted;
 use serde::Serialize;
 
 use super::data::MarkingDistances;
@@ -20,6 +21,9 @@ use crate::lane_change::{MIN_DWELL, is_stay};
 /// Longest time that may be missing between two rows of one track. A car needs several times as long to
 /// cross a marking.
 pub(super) const LONGEST_BRIDGE: Time = Time::from_ms(500);
+
+/// Mean duration of a lane change (s); see [`JUMP_ACROSS_MPS`].
+const LANE_CHANGE_S: f64 = 6.28;
 
 /// Longest time without rows after which a vehicle is taken to have changed lanes once (s). A lane
 /// change takes 6.28 s on average (see [`JUMP_ACROSS_MPS`]). An assumption with a plausible range of 5
@@ -108,6 +112,8 @@ pub struct Continuity {
     pub bridged_frames: u64,
     /// Number of movements that no vehicle makes. Each of them splits a track.
     pub jumps: u64,
+    /// Rows that repeat another row in all values, and are left out.
+    pub repeated_rows: u64,
     /// Changes of the recorded lane within a track.
     pub recorded_crossings: u64,
     /// Changes of the recorded lane in gaps that are not bridged: between two pieces of one vehicle.
@@ -133,6 +139,13 @@ impl Continuity {
         self.edge_crossings >= LEAST_CUT && ONE_CUT_IN * self.edge_crossings > self.all_crossings()
     }
 
+    /// Returns the share of the lane changes that jumps cut off (-), if it is so large that a result is in doubt.
+    /// `recorded_s` is the duration of all tracks together (s).
+    pub(super) fn cut_by_jumps(&self, recorded_s: f64) -> Option<f64> {
+        let share = self.jumps as f64 * LANE_CHANGE_S / recorded_s;
+        (self.jumps >= LEAST_CUT && ONE_HIDDEN_IN as f64 * share > 1.0).then_some(share.min(1.0))
+    }
+
     fn all_crossings(&self) -> u64 {
         self.recorded_crossings + self.hidden_crossings
     }
@@ -152,6 +165,10 @@ impl Continuity {
                 "{} jumps that no vehicle makes. The track was split at each: a number may belong to several vehicles",
                 self.jumps
             ));
+        }
+        if self.repeated_rows > 0 {
+            let rows = counted(self.repeated_rows, "row");
+            warnings.push(format!("left out: {rows} with the values of another row of the same vehicle and frame"));
         }
         if self.hidden_crossings > 0 {
             warnings.push(format!(
@@ -354,6 +371,28 @@ mod tests {
         }
         // A gap of 0.2 s is bridged.
         assert_eq!(read(|frame| !(52..54).contains(&frame)).split_crossings, 0);
+    }
+
+    #[test]
+    fn numbers_that_go_from_vehicle_to_vehicle_cause_doubt_and_a_swap_does_not() {
+        // Ten vehicles in one lane, 40 m apart.
+        let read = |number: &dyn Fn(i32, i32) -> i32| {
+            let mut text = HEADER.to_owned();
+            for (frame, vehicle) in (0..200).flat_map(|frame| (0..10).map(move |vehicle| (frame, vehicle))) {
+                let (time_s, s_m) = (0.1 * f64::from(frame), 40 * vehicle + 3 * frame);
+                let number = number(vehicle, frame);
+                writeln!(text, "{number},{frame},{time_s:.1},{s_m},1.875,1,30,0,4.5,1.8,car").unwrap();
+            }
+            let tracks = open_from(text.as_bytes(), Path::new("a.csv"), ReadOptions::default(), usize::MAX);
+            tracks.unwrap().collect_all().unwrap()
+        };
+        let shifted = read(&|vehicle, frame| (vehicle + frame / 50) % 10);
+        assert_eq!(shifted.continuity.jumps, 30);
+        let warning = "numbers are not unique for each vehicle";
+        assert!(shifted.is_in_doubt && shifted.notes.iter().any(|note| note.ends_with(warning)), "{:?}", shifted.notes);
+        let swapped = read(&|vehicle, frame| if frame >= 100 && vehicle < 2 { 1 - vehicle } else { vehicle });
+        assert_eq!(swapped.continuity.jumps, 2);
+        assert!(!swapped.is_in_doubt, "{:?}", swapped.notes);
     }
 
     #[test]

@@ -208,9 +208,9 @@ pub enum TrajectoryFileProblem {
         /// Column that states no markings.
         column: &'static str,
     },
-    /// A vehicle has two rows for the same frame.
+    /// A vehicle has two rows with different values for the same frame.
     #[error(
-        "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed"
+        "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}, with other values; one row for each is needed"
     )]
     DuplicateRow {
         /// Number of the vehicle or track.
@@ -330,7 +330,7 @@ pub enum TrajectoryFileProblem {
     SemicolonSeparated,
     /// The vehicles follow no road.
     #[error(
-        "in {percent:.0} % of the rows, a vehicle does not follow a road that the traffic shows, as on intersections and \
+        "in {percent:.0} % of the rows, a vehicle does not follow a road that the map or the traffic shows, as on intersections and \
          roundabouts: only roads with lanes are read"
     )]
     NoRoad {
@@ -572,6 +572,15 @@ pub enum TrajectoryFileProblem {
         piece_s: f64,
         /// The likely cause.
         cause: String,
+    },
+    /// Numbers jump from vehicle to vehicle in most steps.
+    #[error(
+        "in {percent:.0} % of the steps from row to row, a number jumps to another place: numbers are not unique for each vehicle, or \
+         positions have errors of metres"
+    )]
+    JumpingNumbers {
+        /// Share of these steps (%).
+        percent: f64,
     },
     /// Vehicles move, but their speeds say that they hardly do.
     #[error(

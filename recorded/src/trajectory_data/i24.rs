@@ -16,6 +16,7 @@
 //!
 //! A file is one array, or one object after the other, as MongoDB exports them.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::io::BufRead;
 
@@ -89,6 +90,8 @@ struct Document {
 struct Reader {
     collected: Collected,
     documents: u64,
+    /// The first trajectory that begins at this time and place: another one is its copy.
+    begun: HashMap<[u64; 3], u64>,
     error: Option<ReadError>,
     has: [bool; 2],
     /// Sum of the signs of the lateral positions to the right, of each direction.
@@ -183,7 +186,9 @@ impl Reader {
         if !allowed::WIDTH_M.contains(width_m) {
             return Err(wrong("width", &format!("{width_m:.2} m"), "a width above 0 and up to 10 m"));
         }
-        let vehicle = self.collected.vehicle(&number.to_string());
+        let start =
+            [&timestamp, &x_position, &y_position].map(|values| values.first().map_or(0, |value| value.to_bits()));
+        let vehicle = self.collected.vehicle(&self.begun.entry(start).or_insert(number).to_string());
         let road = u32::from(direction < 0.0);
         self.has[road as usize] = true;
         let along_m: Vec<f64> = x_position.iter().map(|x| direction * FOOT_M * x + 0.5 * length_m).collect();

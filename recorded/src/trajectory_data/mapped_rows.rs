@@ -28,6 +28,11 @@ const LEAST_ROWS: usize = 50;
 /// is shifted by a lane, a fifth to a half of the traffic is off it; on shoulders drive single vehicles. An assumption
 /// with a plausible range of 0.05 to 0.2.
 const OFF_MAP: f64 = 0.1;
+/// Cosine of the largest angle between a vehicle on a road and the road, 30° (-).
+const MOST_TURNED: f64 = 0.866;
+/// Share of the rows of moving vehicles that are turned by more, above which they are the reason why a file cannot be
+/// followed (-), as the share of a derived road that causes a warning.
+const OFF_ROAD: f64 = 0.05;
 /// Least lateral speed of a vehicle that enters another lane (m/s): a lane that begins on the left changes the
 /// numbers of the others, and no vehicle moves. An assumption with a plausible range of 0.1 to 0.5 m/s.
 const SIDEWAYS_MPS: f64 = 0.3;
@@ -61,9 +66,10 @@ struct InLane {
 /// The rows of vehicles that a map has lanes for. The rows of each vehicle are in the order of their times.
 #[derive(Debug, Default)]
 pub(super) struct MappedRows {
-    /// Rows of moving vehicles, and those beside all lanes.
+    /// Rows of moving vehicles, those beside all lanes, and those with a heading across the road.
     moving: usize,
     off_map: usize,
+    across: usize,
     /// Each vehicle in its latest row.
     latest: BTreeMap<u64, InLane>,
     /// Changes of the lane by a lateral movement, from a stay to a stay, and those to a lanelet that continues the one
@@ -78,6 +84,7 @@ impl MappedRows {
         let MappedRow { vehicle, time, point, heading_rad, speed_mps, place } = row;
         if speed_mps.abs() > MIN_SPEED_MPS {
             self.off_map += usize::from(!place.is_on_map);
+            self.across += usize::from(maths::cos(heading_rad - place.heading_rad).abs() < MOST_TURNED);
             self.moving += 1;
         }
         let entered = InLane { lane: place.lane, since: time, point, entered_by_turn: None };
@@ -101,6 +108,13 @@ impl MappedRows {
         (self.moving >= LEAST_ROWS && share > OFF_MAP).then(|| {
             format!("in {:.0} % of the rows, a vehicle drives beside the lanes of the map: {MISPLACED}", 100.0 * share)
         })
+    }
+
+    /// Returns the share of the rows in which a vehicle drives across its road (%), if it is large: as on intersections, the
+    /// lanes of the map form no road that the vehicles follow.
+    pub(super) fn off_road_percent(&self) -> Option<f64> {
+        let share = self.across as f64 / self.moving.max(1) as f64;
+        (self.moving >= LEAST_ROWS && share > OFF_ROAD).then_some(100.0 * share)
     }
 
     /// Returns the doubt about lane changes if many of them are turns.
@@ -166,6 +180,15 @@ mod tests {
         assert_eq!((rows.changes, rows.turns, rows.doubt_of_turns()), (11, 1, None));
         drive(&mut rows, 201, turn);
         assert!(rows.doubt_of_turns().unwrap().starts_with("in 2 of 12 changes of the lane"));
+    }
+
+    #[test]
+    fn vehicles_across_the_road_are_a_reason_why_a_file_cannot_be_followed() {
+        let mut rows = MappedRows::default();
+        drive(&mut rows, 1, |_| -6.0);
+        assert_eq!(rows.off_road_percent(), None);
+        drive(&mut rows, 2, |x_m| 3.0 * (x_m - 100.0));
+        assert!(rows.off_road_percent().is_some_and(|percent| (45.0..=55.0).contains(&percent)));
     }
 
     #[test]

@@ -407,6 +407,10 @@ impl<R: BufRead> RowSource for OsiSource<R> {
         neighbours.and_then(|()| self.motion.headings.check(Layout::Osi)).map_err(ReadError::of_file)
     }
 
+    fn off_road_percent(&self) -> Option<f64> {
+        self.mapped.off_road_percent()
+    }
+
     fn map_doubt(&self) -> Option<String> {
         self.mapped.doubt_of_place()
     }

@@ -12,11 +12,12 @@
 
 use std::collections::BTreeMap;
 
-use closecall_traffic::maths;
 use closecall_traffic::statistics::quantiles::median;
+use closecall_traffic::{Time, maths};
 
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
+use super::jumping_numbers::NumberSteps;
 use super::plane_pieces::PlaneMoment;
 use super::plausible::{MIN_SPEED_MPS, MIN_STEPS, check_ratio};
 
@@ -43,6 +44,7 @@ pub(super) struct PlaneSteps {
     against: usize,
     /// Distance of each step as a share of the distance that the speed predicts (-).
     ratios: Vec<f64>,
+    numbers: NumberSteps,
 }
 
 impl PlaneSteps {
@@ -51,6 +53,7 @@ impl PlaneSteps {
         if self.movements >= ENOUGH {
             return;
         }
+        self.numbers.add(row.vehicle, Time::ZERO, row.time, row.point);
         // A second row of a frame is refused by that reason later.
         if self.latest.get(&row.vehicle).is_some_and(|before| before.time == row.time) {
             return;
@@ -74,8 +77,9 @@ impl PlaneSteps {
     /// Checks the steps so far.
     ///
     /// # Errors
-    /// The positions contradict the speeds and times, or the headings.
+    /// Numbers jump, or the positions contradict the speeds and times, or the headings.
     pub(super) fn check(&self, layout: Layout) -> Result<(), TrajectoryFileProblem> {
+        self.numbers.check()?;
         if self.ratios.len() >= MIN_STEPS {
             check_ratio(median(self.ratios.clone()), layout)?;
         }
@@ -94,8 +98,6 @@ impl PlaneSteps {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::Time;
-
     use super::super::source::Clock;
     use super::*;
 

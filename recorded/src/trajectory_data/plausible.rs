@@ -5,6 +5,7 @@
 //!
 //! | quantity | plausible | detects |
 //! |---|---|---|
+//! | steps that differ from the step before as no vehicle's do | at most half | numbers that are not unique for each vehicle |
 //! | median length of cars | 2 to 12 m | feet instead of metres and the reverse, swapped length and width |
 //! | median width of cars | 1 to 3 m | the same |
 //! | median speed of moving vehicles | up to 70 m/s | feet instead of metres throughout a file, times that count too fast |
@@ -12,8 +13,10 @@
 //! | vehicles that advance by more than 1.6 times what their recorded speeds make | at most 20 % | a column of zeros |
 //! | median of (distance between two frames) / (speed · time) | 0.6 to 1.6; 0.8 to 1.25 in simulations | km/h, mph or ft/s instead of m/s (3.6, 2.2, 3.3), a wrong frame rate, swapped s and d, traffic that drives backwards |
 //! | the same of all vehicles together, without jumps | 0.9 to 1.1, else a result is in doubt | a frame rate of 25 Hz for 30 Hz |
+//! | (change of the speed by the recorded accelerations) / (change of the recorded speed) | 0.5 to 2, else a result is in doubt | accelerations of 0, in ft/s² or g, with the other sign or in the axes of the vehicle |
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use closecall_traffic::statistics::quantiles::median;
 use closecall_traffic::{Time, VehicleClass};
@@ -21,6 +24,7 @@ use closecall_traffic::{Time, VehicleClass};
 use super::continuity::{FrameClock, is_jump};
 use super::error::TrajectoryFileProblem;
 use super::file_layout::Layout;
+use super::jumping_numbers::NumberSteps;
 use super::source::{ReadError, Row};
 
 /// Minimum speed of a vehicle for its steps to count (m/s). At lower speeds, position noise hides a
@@ -52,6 +56,18 @@ const TOO_LOW_VEHICLES: f64 = 0.2;
 /// An assumption with a plausible range of 0.05 to 0.15.
 const MOST_DISAGREEMENT: f64 = 0.1;
 
+/// Shortest time over which accelerations are compared with speeds (s), and the least number of steps: single speeds
+/// are rounded, and some simulations state the acceleration of the step before.
+const COMPARED_S: f64 = 1.0;
+const COMPARED_STEPS: usize = 5;
+/// Least change of the speed in this time that counts (m/s), and the least number of such changes.
+const LEAST_CHANGE_MPS: f64 = 1.0;
+const LEAST_CHANGES: usize = 20;
+/// Plausible change of the speed by the recorded accelerations, as a share of the change of the recorded speed (-). The
+/// windows of US-101 have 0.71 to 0.93, because NGSIM's accelerations are smoothed more than the speeds. Feet instead
+/// of metres make 3.28 of 1.
+const PLAUSIBLE_CHANGE: RangeInclusive<f64> = 0.5..=2.0;
+
 /// One step of a vehicle between two frames.
 struct RoadStep {
     vehicle: (u64, Time),
@@ -63,6 +79,9 @@ struct RoadStep {
 
 /// Rejects rows whose medians are implausible for road traffic.
 pub(super) fn check(rows: &[Row], layout: Layout, clock: FrameClock) -> Result<(), ReadError> {
+    let mut numbers = NumberSteps::default();
+    rows.iter().for_each(|row| numbers.add(row.number, row.origin, row.time, (row.s_m, row.d_m)));
+    numbers.check().map_err(ReadError::of_file)?;
     let cars = || rows.iter().filter(|row| row.class == VehicleClass::Car);
     // In-car logs need not state the size of their vehicle, and that single vehicle may have any
     // size.
@@ -190,6 +209,52 @@ pub(super) fn doubt(rows: &[Row], clock: FrameClock) -> Option<String> {
     })
 }
 
+/// The change of a vehicle's speed since a row, by its accelerations.
+#[derive(Clone, Copy)]
+struct SpeedChange {
+    from: Row,
+    latest: Row,
+    steps: usize,
+    by_acceleration_mps: f64,
+}
+
+/// Returns the doubt about the accelerations of a file, if they contradict the changes of the speeds.
+pub(super) fn doubt_of_accelerations(rows: &[Row], clock: FrameClock) -> Option<String> {
+    let mut open: BTreeMap<(u64, Time), SpeedChange> = BTreeMap::new();
+    let (mut changes, mut products, mut squares) = (0, 0.0, 0.0);
+    for row in rows {
+        let begun = SpeedChange { from: *row, latest: *row, steps: 0, by_acceleration_mps: 0.0 };
+        let change = open.entry((row.number, row.origin)).or_insert(begun);
+        let before = std::mem::replace(&mut change.latest, *row);
+        let accelerations = before.acceleration_mps2.zip(row.acceleration_mps2);
+        let Some((from_mps2, to_mps2)) = accelerations
+            .filter(|_| row.frame == before.frame + clock.frames && row.time > before.time && !is_jump(&before, row))
+        else {
+            *change = begun;
+            continue;
+        };
+        change.steps += 1;
+        change.by_acceleration_mps += 0.5 * (from_mps2 + to_mps2) * (row.time - before.time).s();
+        if change.steps >= COMPARED_STEPS && (row.time - change.from.time).s() >= COMPARED_S {
+            let change_mps = row.speed_mps - change.from.speed_mps;
+            if change_mps.abs() >= LEAST_CHANGE_MPS {
+                changes += 1;
+                products += change.by_acceleration_mps * change_mps;
+                squares += change_mps * change_mps;
+            }
+            *change = begun;
+        }
+    }
+    let share = products / squares;
+    (changes >= LEAST_CHANGES && !PLAUSIBLE_CHANGE.contains(&share)).then(|| {
+        format!(
+            "the recorded accelerations make {:.0} % of the changes of the recorded speeds: they are missing, in another unit, or in other \
+             axes, and metrics of the acceleration are wrong with them",
+            100.0 * share
+        )
+    })
+}
+
 /// Returns the numbers and the movements of the vehicles that move.
 fn moving(rows: &[Row], clock: FrameClock) -> Vec<(u64, Travel)> {
     let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
@@ -255,4 +320,42 @@ fn check_median(mut values: Vec<(f64, u64)>, plausible: Plausible) -> Result<(),
     }
     let actual = format!("{median:.3} {unit}").trim_end().to_owned();
     Err(ReadError::new(line, TrajectoryFileProblem::Implausible { quantity, actual, allowed }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+    use std::path::Path;
+
+    use closecall_traffic::maths;
+
+    use crate::trajectory_data::{ReadOptions, open_from};
+
+    #[test]
+    fn accelerations_that_contradict_the_speeds_cause_doubt() {
+        // Five vehicles over 40 s, between 22 and 28 m/s.
+        let notes = |written: &dyn Fn(f64) -> String| {
+            let mut text =
+                "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n"
+                    .to_owned();
+            for (track, frame) in (1..=5).flat_map(|track| (0..400).map(move |frame| (track, frame))) {
+                let time_s = 0.1 * f64::from(frame);
+                let (sine, cosine) = (maths::sin(0.5 * time_s), maths::cos(0.5 * time_s));
+                let s_m = 60.0 * f64::from(track) + 25.0 * time_s - 6.0 * cosine;
+                let (speed_mps, acceleration) = (25.0 + 3.0 * sine, written(1.5 * cosine));
+                writeln!(text, "{track},{frame},{time_s:.1},{s_m:.3},1.8,1,{speed_mps:.3},{acceleration},4.5,1.8,car")
+                    .unwrap();
+            }
+            let tracks = open_from(text.as_bytes(), Path::new("a.csv"), ReadOptions::default(), usize::MAX);
+            let data = tracks.unwrap().collect_all().unwrap();
+            (data.is_in_doubt, data.notes)
+        };
+        for factor in [0.0, -1.0, 1.0 / 0.3048, 1.0 / 9.81] {
+            let (is_in_doubt, notes) = notes(&|mps2| format!("{:.3}", factor * mps2));
+            let is_named = |note: &String| note.starts_with("the recorded accelerations make");
+            assert!(is_in_doubt && notes.iter().any(is_named), "{factor}: {notes:?}");
+        }
+        assert_eq!(notes(&|mps2| format!("{mps2:.3}")), (false, Vec::new()));
+        assert_eq!(notes(&|_| String::new()), (false, Vec::new()));
+    }
 }

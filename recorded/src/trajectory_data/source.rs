@@ -32,7 +32,7 @@ pub(super) enum Clock {
 }
 
 /// One vehicle at one frame, in SI units.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Row {
     /// Number of the vehicle or track in the file. Rows with the same number and origin form one
     /// track before it is split at gaps.
@@ -54,6 +54,13 @@ pub(super) struct Row {
     /// Distances to the lane markings; only in-car logs have them.
     pub(super) marking_distances: MarkingDistances,
     pub(super) line: u64,
+}
+
+impl Row {
+    /// Returns `true` if the row has all values of `other`.
+    pub(super) fn repeats(&self, other: &Self) -> bool {
+        Self { line: other.line, ..*self } == *other
+    }
 }
 
 /// The knowledge of a reader about its file before the last row.
@@ -84,6 +91,12 @@ pub(super) trait RowSource {
     /// Returns `true` if a warning says why lane changes may be wrong or missing.
     fn is_in_doubt(&self) -> bool {
         false
+    }
+
+    /// Returns the share of the rows so far in which a vehicle does not follow the road of the map (%), if it is so
+    /// large that the positions along the road mean nothing.
+    fn off_road_percent(&self) -> Option<f64> {
+        None
     }
 
     /// Checks that the velocities of the rows so far have the axes of the positions.

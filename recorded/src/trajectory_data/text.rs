@@ -27,6 +27,9 @@ pub(super) struct TextSource<R> {
     /// Length of the last field of the row before (bytes): a shorter one at the end of the file may
     /// be cut.
     usual_last_field: usize,
+    /// The line before, and its row.
+    latest_line: String,
+    latest_row: Option<Row>,
     location: Location,
 }
 
@@ -81,7 +84,18 @@ impl<R: BufRead> TextSource<R> {
     fn at_start(lines: Lines<R>, format: Format, first: (u64, String)) -> Self {
         let (fields, location) = (Fields::default(), Location::default());
         let (header, first) = if format.has_header { (Some(first.1), None) } else { (None, Some(first)) };
-        Self { lines, format, fields, name: None, header, first, usual_last_field: 0, location }
+        Self {
+            lines,
+            format,
+            fields,
+            name: None,
+            header,
+            first,
+            usual_last_field: 0,
+            latest_line: String::new(),
+            latest_row: None,
+            location,
+        }
     }
 }
 
@@ -144,7 +158,8 @@ impl<R: BufRead> RowSource for TextSource<R> {
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
-        let Self { lines, format, fields, name, header, first, usual_last_field, location } = self;
+        let Self { lines, format, fields, name, header, first, usual_last_field, latest_line, latest_row, location } =
+            self;
         loop {
             let first = first.take();
             let (number, line) = match &first {
@@ -160,7 +175,16 @@ impl<R: BufRead> RowSource for TextSource<R> {
             if header.as_deref() == Some(line) {
                 return Err(ReadError::new(number, TrajectoryFileProblem::RepeatedHeader));
             }
+            // A line that stands there twice is no second row: metadata count one, and a clock goes on.
+            if latest_line == line {
+                match *latest_row {
+                    Some(row) => return Ok(Some(Row { line: number, ..row })),
+                    None => continue,
+                }
+            }
             let row = parse(line, format, fields, name, location).map_err(|error| ReadError::new(number, error))?;
+            line.clone_into(latest_line);
+            *latest_row = row;
             let last_field = fields.last_len();
             if lines.is_unterminated() && last_field < *usual_last_field {
                 return Err(ReadError::new(number, TrajectoryFileProblem::CutLine));

@@ -22,6 +22,7 @@ use super::lane_spacing;
 use super::markings::LaneMarkings;
 use super::ngsim;
 use super::order::{WINDOW_ROWS, order_of};
+use super::overlaps;
 use super::plausible;
 use super::side_by_side::{self, SideBySide};
 use super::sides::Sides;
@@ -156,8 +157,8 @@ pub struct Tracks<'a> {
     axis_warning: Option<String>,
     /// Why the recorded lanes are in doubt.
     lane_doubt: Option<String>,
-    /// Why the times, the positions or the speeds are in doubt.
-    speed_doubt: Option<String>,
+    /// Why the times, the positions, the speeds, the accelerations or the numbers of vehicles are in doubt.
+    row_doubts: Vec<String>,
     /// Why lanes that the positions show are in doubt.
     crossing_doubt: Option<String>,
     /// What shows which side is left.
@@ -209,7 +210,7 @@ impl<'a> Tracks<'a> {
             axes: Axes::default(),
             axis_warning: None,
             lane_doubt: None,
-            speed_doubt: None,
+            row_doubts: Vec::new(),
             crossing_doubt: None,
             sides: Sides::Shown,
             is_simulated: false,
@@ -304,10 +305,27 @@ impl<'a> Tracks<'a> {
     /// Returns `true` if a warning on the file or on the rows so far says that lane changes may be
     /// wrong or missing, or that the recorded lanes are none.
     pub fn is_in_doubt(&self) -> bool {
-        let doubts = [&self.lane_doubt, &self.speed_doubt, &self.crossing_doubt];
-        let is_of_file = doubts.iter().any(|doubt| doubt.is_some()) || self.source.is_in_doubt();
+        let is_of_file = self.lane_doubt.is_some()
+            || !self.row_doubts.is_empty()
+            || self.crossing_doubt.is_some()
+            || self.source.is_in_doubt();
         let are_missing = ONE_SHARED_IN * self.dropped.of_shared_numbers() > self.rows;
-        is_of_file || are_missing || self.sides.is_doubt() || self.is_coarse() || self.continuity().hides_lane_changes()
+        is_of_file
+            || are_missing
+            || self.cut_by_jumps().is_some()
+            || self.sides.is_doubt()
+            || self.is_coarse()
+            || self.continuity().hides_lane_changes()
+    }
+
+    /// Returns the duration of all tracks so far together (s).
+    fn recorded_s(&self) -> f64 {
+        self.rows as f64 * self.period.s()
+    }
+
+    /// Returns the share of the lane changes that jumps cut off (-), if a result is in doubt by it.
+    fn cut_by_jumps(&self) -> Option<f64> {
+        self.builder.continuity().cut_by_jumps(self.recorded_s())
     }
 
     /// Returns `true` if a warning says that the recorded lanes are none: vehicles of one lane drive
@@ -355,7 +373,7 @@ impl<'a> Tracks<'a> {
         let coarse = self.is_coarse().then(|| coarse_frames(self.mean_period()));
         let sides = self.sides.warning().map(str::to_owned);
         let doubts =
-            self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.speed_doubt).chain(&self.crossing_doubt);
+            self.axis_warning.iter().chain(&self.lane_doubt).chain(&self.row_doubts).chain(&self.crossing_doubt);
         let doubts = doubts.cloned().chain(sides);
         let shared = self.dropped.of_shared_numbers();
         let shared = (shared > 0).then(|| {
@@ -365,7 +383,16 @@ impl<'a> Tracks<'a> {
                 self.rows
             )
         });
-        let notes = self.source.warnings().into_iter().chain(doubts).chain(shared);
+        let cut = self.cut_by_jumps().map(|share| {
+            format!(
+                "{} jumps that no vehicle makes, in {:.0} s of all tracks together, cut off about {:.0} % of the lane changes: numbers are \
+                 not unique for each vehicle",
+                self.builder.continuity().jumps,
+                self.recorded_s(),
+                100.0 * share
+            )
+        });
+        let notes = self.source.warnings().into_iter().chain(doubts).chain(shared).chain(cut);
         notes.chain(coarse).chain(unknown_lanes).collect()
     }
 
@@ -520,6 +547,9 @@ impl<'a> Tracks<'a> {
         if rows.is_empty() {
             return Err(self.dropped.take_first().unwrap_or(ReadError::of_file(TrajectoryFileProblem::Empty)));
         }
+        if self.ended && !is_in_order(&rows) {
+            sort(&mut rows);
+        }
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         let frame_period = self.source.info().period.unwrap_or_else(|| period(beginning));
         let clock = FrameClock::of_rows(beginning, frame_period);
@@ -534,7 +564,17 @@ impl<'a> Tracks<'a> {
         rows.iter_mut().for_each(|row| self.axes.turn(row));
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
         let checked = self.check_beginning(beginning, stated.as_ref(), clock);
-        checked.map_err(|error| self.shared_number(beginning, clock).unwrap_or(error))?;
+        checked.map_err(|error| {
+            let is_along = matches!(
+                error.problem,
+                TrajectoryFileProblem::AgainstTheRoad { .. }
+                    | TrajectoryFileProblem::ImplausibleSteps { .. }
+                    | TrajectoryFileProblem::JumpingNumbers { .. }
+                    | TrajectoryFileProblem::SpeedsTooLow { .. }
+            );
+            let shared = self.shared_number(beginning, clock);
+            shared.or_else(|| self.off_road().filter(|_| is_along)).unwrap_or(error)
+        })?;
         self.is_simulated = beginning.first().is_some_and(|row| row.clock == Clock::Simulated);
         self.jumps_to_lanes = self.is_simulated && jump_to_lanes(beginning, clock);
         // The log of one vehicle shows no lanes of a road.
@@ -550,7 +590,7 @@ impl<'a> Tracks<'a> {
         }
         if self.ended {
             separate_data_sets(&mut rows);
-            rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
+            sort(&mut rows);
             self.builder = TrackBuilder::for_sorted(clock, start);
         } else {
             self.builder = TrackBuilder::for_stream(clock, start, order_of(&rows, clock)?);
@@ -583,12 +623,11 @@ impl<'a> Tracks<'a> {
         let layout = self.source.info().layout;
         self.source.check_velocities()?;
         plausible::check(beginning, layout, clock)?;
-        self.speed_doubt = plausible::doubt(beginning, clock);
-        if self.lanes == LaneReliability::Unreliable
-            && matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25)
-        {
-            self.speed_doubt = self.speed_doubt.take().or_else(|| side_by_side::doubt_of_unit(beginning));
-        }
+        let speeds = plausible::doubt(beginning, clock).or_else(|| plausible::doubt_of_accelerations(beginning, clock));
+        let states_unit = self.lanes != LaneReliability::Unreliable
+            || !matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25);
+        let unit = if states_unit { None } else { side_by_side::doubt_of_unit(beginning) };
+        self.row_doubts = speeds.or(unit).into_iter().chain(overlaps::doubt(beginning)).collect();
         // Other readers derive the lanes from the positions, so that only an option can part them.
         let states_lanes =
             matches!(layout, Layout::Plain | Layout::Ngsim18 | Layout::Ngsim25 | Layout::Highd | Layout::OpenLabel);
@@ -642,6 +681,13 @@ impl<'a> Tracks<'a> {
         shared.filter(|_| self.bad_rows == BadRows::Reject)
     }
 
+    /// Returns the refusal of traffic that does not follow the road of the map, if there is one. Positions along the
+    /// road are then a reason why rows contradict other checks.
+    fn off_road(&self) -> Option<ReadError> {
+        let percent = self.source.off_road_percent()?;
+        Some(ReadError::of_file(TrajectoryFileProblem::NoRoad { percent }))
+    }
+
     /// Returns `error`, or the problem of the whole file that it belongs to, as the further rows show.
     /// `used` rows before it can be used.
     fn judged(&mut self, error: ReadError, used: usize) -> ReadError {
@@ -678,11 +724,18 @@ impl<'a> Tracks<'a> {
     fn finish(&mut self) -> Result<(), ReadError> {
         self.check_skipped()?;
         self.builder.finish()?;
-        let Continuity { vehicles, pieces, .. } = self.continuity();
-        let piece_s = self.rows as f64 * self.period.s() / pieces as f64;
+        let Continuity { vehicles, pieces, jumps, .. } = self.continuity();
+        let piece_s = self.recorded_s() / pieces as f64;
         if pieces > SHREDS_PER_VEHICLE * vehicles && piece_s < SHRED_S {
-            let usual = || "frames are missing throughout, or numbers are given to other vehicles".to_owned();
-            let cause = self.lane_doubt.clone().unwrap_or_else(usual);
+            if let Some(error) = self.off_road() {
+                return Err(error);
+            }
+            let usual = if 2 * jumps > pieces - vehicles {
+                "numbers jump from place to place: they are not unique for each vehicle, or positions have errors of metres"
+            } else {
+                "frames are missing throughout"
+            };
+            let cause = self.lane_doubt.clone().unwrap_or_else(|| usual.to_owned());
             return Err(ReadError::of_file(TrajectoryFileProblem::Shreds { vehicles, pieces, piece_s, cause }));
         }
         Ok(())
@@ -700,6 +753,17 @@ impl Iterator for Tracks<'_> {
     fn next(&mut self) -> Option<Self::Item> {
         self.next_track().transpose()
     }
+}
+
+/// Returns true if the rows of each vehicle are in the order of their times, as the checks follow them.
+fn is_in_order(rows: &[Row]) -> bool {
+    let mut latest: BTreeMap<(u64, Time), Time> = BTreeMap::new();
+    rows.iter().all(|row| latest.insert((row.number, row.origin), row.time).is_none_or(|before| before <= row.time))
+}
+
+/// Sorts rows by vehicle and time.
+fn sort(rows: &mut [Row]) {
+    rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
 }
 
 /// Returns true if `bad` rows are more than half of all `rows`, and no damage of single rows.

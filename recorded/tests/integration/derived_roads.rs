@@ -287,7 +287,7 @@ fn write_exid(folder: &Path, tracks: &[Trajectory], lanelet_m: f64, flag: Flag) 
         let rows = rows(std::slice::from_ref(track));
         writeln!(meta, "0,{},{},car", track.track_id, rows.len()).unwrap();
         let mut before = None;
-        for row in rows {
+        for (row, point) in rows.into_iter().zip(&track.points) {
             let lanelet = 1_000.0 + 10.0 * (row.s_m / lanelet_m).floor() + f64::from(row.lane);
             let changes = before.is_some_and(|(lane, _)| lane != row.lane);
             let flag = u8::from(flag(changes, before.is_some_and(|(_, before)| before != lanelet)));
@@ -295,8 +295,8 @@ fn write_exid(folder: &Path, tracks: &[Trajectory], lanelet_m: f64, flag: Flag) 
             let frame = (10.0 * row.time.s()).round();
             writeln!(
                 text,
-                "0,{},{frame},{:.3},{:.3},0.0,1.8,4.5,{:.3},0,3.5,{lanelet},{flag}",
-                row.vehicle, row.s_m, row.d_m, row.speed_mps
+                "0,{},{frame},{:.3},{:.3},0.0,1.8,4.5,{:.3},{:.3},3.5,{lanelet},{flag}",
+                row.vehicle, row.s_m, row.d_m, row.speed_mps, point.acceleration_mps2
             )
             .unwrap();
         }

@@ -16,6 +16,7 @@ mod ngsim_us101;
 mod osi;
 mod other_programs;
 mod own_trajectory_files;
+mod repeated_rows;
 mod robustness;
 mod smooth_file;
 mod support;

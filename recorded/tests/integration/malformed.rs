@@ -96,7 +96,10 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
         (cell("vehicle_class", "2"), vec!["line 3", "`vehicle_class`", "car, truck, motorcycle"]),
         (cell("recording_id", "b"), vec!["line 3", "`recording_id`", "`b`", "`a`", "one data set for each file"]),
         (cell("accel_mps2", "?"), vec!["line 3", "`accel_mps2`"]),
-        (second(&[]), vec!["line 3", "frame 0 of vehicle 1 stands there twice", "line 2"]),
+        (
+            second(&[("speed_mps", "13.3")]),
+            vec!["line 3", "frame 0 of vehicle 1 stands there twice", "line 2", "other values"],
+        ),
         (second(&[("time_s", "5.0")]), vec!["line 3", "stands there twice"]),
         (
             plain(&[
@@ -123,7 +126,10 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
         (ngsim(&[(10, "7")]), vec!["line 1", "`v_Class`", "motorcycle"]),
         (ngsim(&[(3, "-5")]), vec!["line 1", "`Global_Time`"]),
         (format!("{}\n{}", ngsim(&[]), "1 13 884 11633"), vec!["line 2", "4 columns, but 18 are needed"]),
-        (format!("{}\n{}\n", ngsim(&[]), ngsim(&[])), vec!["line 2", "frame 12 of vehicle 1 stands there twice"]),
+        (
+            format!("{}\n{}\n", ngsim(&[]), ngsim(&[(11, "43.7")])),
+            vec!["line 2", "frame 12 of vehicle 1 stands there twice"],
+        ),
         (
             format!("{}\n{}\n", ngsim(&[]), ngsim(&[(1, "19"), (3, "1163368300100")])),
             vec!["line 2", "from frame 12 (line 1) to frame 19"],

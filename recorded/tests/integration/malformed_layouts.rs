@@ -149,14 +149,14 @@ fn obstacle(states: &str) -> String {
     )
 }
 
-fn state(x: &str, time: &str) -> String {
+pub(crate) fn state(x: &str, time: &str) -> String {
     format!(
         "<state><position><point><x>{x}</x><y>-1.7</y></point></position><orientation><exact>0</exact></orientation>\
          <time><exact>{time}</exact></time><velocity><exact>20</exact></velocity></state>\n"
     )
 }
 
-fn trajectory(states: &[String]) -> String {
+pub(crate) fn trajectory(states: &[String]) -> String {
     scenario(&obstacle(&format!("<trajectory>{}</trajectory>", states.concat())))
 }
 

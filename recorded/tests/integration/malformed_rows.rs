@@ -135,7 +135,7 @@ fn a_truncated_last_row_is_detected() {
 fn bad_rows_are_skipped_and_counted_on_request() {
     let text = drive(|_| {});
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
-    lines[5] = lines[4].clone();
+    lines[5] = lines[4].replace("25.000", "25.100");
     lines[9] = lines[9].replace("25.000", "fast");
     lines[20] = "a,1,1".to_owned();
     let text = lines.join("\n") + "\n";

@@ -279,6 +279,24 @@ fn a_trace_without_lanes_is_read_if_they_are_to_be_estimated() {
 }
 
 #[test]
+fn a_message_that_stands_there_twice_counts_once() {
+    for lanes in [Some(lanes(true)), None] {
+        let reliability = if lanes.is_some() { LaneReliability::Reliable } else { LaneReliability::Unreliable };
+        let messages = messages(lanes);
+        let mut twice = messages.clone();
+        twice.insert(101, messages[100].clone());
+        let [data, twice] = [messages, twice].map(|messages| read("run.osi", &trace(&messages), reliability).unwrap());
+        assert_eq!((data.continuity.repeated_rows, twice.continuity.repeated_rows), (0, 24));
+        assert!(
+            twice.warnings().iter().any(|warning| warning.starts_with("left out: 24 rows")),
+            "{:?}",
+            twice.warnings()
+        );
+        assert_eq!(twice.trajectories, data.trajectories);
+    }
+}
+
+#[test]
 fn damaged_messages_are_refused_with_their_place() {
     let good = || messages(Some(lanes(true)));
     let with = |change: &dyn Fn(&mut MovingObject)| {

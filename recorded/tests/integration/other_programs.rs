@@ -75,7 +75,7 @@ fn times_s() -> impl Iterator<Item = f64> {
     (0..120).map(|step| 0.1 * f64::from(step))
 }
 
-fn sumo_xml(jumps: bool) -> String {
+pub(crate) fn sumo_xml(jumps: bool) -> String {
     let mut text = "<?xml version=\"1.0\"?>\n<!-- by SUMO -->\n<fcd-export>\n".to_owned();
     for time_s in times_s() {
         writeln!(text, "<timestep time=\"{time_s:.2}\">").unwrap();
@@ -725,7 +725,7 @@ fn malformed_vehicle_records_are_refused() {
 }
 
 /// Two directions with 10 vehicles each; one changes lanes.
-fn i24(is_array: bool) -> String {
+pub(crate) fn i24(is_array: bool) -> String {
     let mut documents = Vec::new();
     for number in 0..20_u32 {
         let (direction, first) = (if number % 2 == 0 { 1.0 } else { -1.0 }, 5.0 * f64::from(number));
