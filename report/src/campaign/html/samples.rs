@@ -87,7 +87,6 @@ fn measured(value: Measured) -> Markup {
     }
 }
 
-/// Returns why samples of a scenario have no outcome; empty if all have one.
 /// Returns the command that runs a failed sample again, from within the campaign's folder.
 fn replay_failure(findings: &Findings<'_>, scenario: &str, failure: &FailureKindCount) -> String {
     let saved_sample = SavedSample { folder: ".", sample: failure.first_sample, scenario: Some(scenario) };
@@ -95,6 +94,7 @@ fn replay_failure(findings: &Findings<'_>, scenario: &str, failure: &FailureKind
     (findings.command_for)(&Action::Replay(replay))
 }
 
+/// Returns why samples of a scenario have no outcome; empty if all have one.
 pub(super) fn errors(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Markup {
     let counts = findings.summary.scenarios.iter().find(|(name, _)| *name == scenario.name);
     let Some((_, counts)) = counts.filter(|(_, counts)| !counts.failures.is_empty()) else {
