@@ -23,6 +23,7 @@ use crate::lane_change::{MIN_DWELL, is_stay};
 pub(super) const LONGEST_BRIDGE: Time = Time::from_ms(500);
 
 /// Mean duration of a lane change (s); see [`JUMP_ACROSS_MPS`].
+#[expect(clippy::approx_constant, reason = "a measured duration, and no multiple of π")]
 const LANE_CHANGE_S: f64 = 6.28;
 
 /// Longest time without rows after which a vehicle is taken to have changed lanes once (s). A lane
