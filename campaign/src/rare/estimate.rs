@@ -91,7 +91,7 @@ impl Mean {
     /// scatter.
     pub fn interval(&self, coverage: f64) -> Option<[f64; 2]> {
         let half = self.factor(0.5 * (1.0 + coverage)) * self.standard_error;
-        (half > 0.0).then(|| [self.value - half, self.value + half])
+        (half > 0.0).then_some([self.value - half, self.value + half])
     }
 
     /// Returns the width of the 95 % interval, relative to the value.
