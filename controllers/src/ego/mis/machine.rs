@@ -214,11 +214,7 @@ impl Mis {
         if let Some(failed) = situation.input.sensors.reason() {
             return Err(failed);
         }
-        let thw_s = situation.thw_front_s().map_err(|absent| match absent {
-            Absent::NoLead => Reason::NoFront,
-            // The headway of an ego that stands is endless.
-            _ => Reason::FrontMarginLong,
-        })?;
+        let thw_s = situation.thw_front_s().map_err(|_| Reason::NoFront)?;
         if !(thw_s < settings.short_thw_s) {
             return Err(Reason::FrontMarginLong);
         }

@@ -48,7 +48,6 @@ struct Bench {
     time: Time,
     road: Road,
     lane: Lane,
-    speed_mps: f64,
     sensors: SensorAvailability,
     tracks: Vec<Track>,
 }
@@ -100,7 +99,6 @@ impl Bench {
             time: Time::ZERO,
             road: Road::straight(3),
             lane: Lane(2),
-            speed_mps: 30.0,
             sensors: SensorAvailability::ALL,
             tracks: vec![track(1, 21.0 + CAR_M, 30.0, 1), track(2, -90.0 - CAR_M, 38.0, 1)],
         }
@@ -123,7 +121,7 @@ impl Bench {
             track.time = self.time;
         }
         let odometry = Odometry {
-            speed_mps: self.speed_mps,
+            speed_mps: 30.0,
             acceleration_mps2: 0.0,
             yaw_rate_radps: 0.0,
             lane: self.lane,

@@ -41,16 +41,6 @@ fn front_margin_long() {
 }
 
 #[test]
-fn an_ego_that_stands_has_a_vehicle_ahead() {
-    let mut bench = Bench::new();
-    bench.speed_mps = 0.0;
-    bench.assert_not_engaged(Reason::FrontMarginLong);
-    bench.tracks.remove(0);
-    bench.step_for(0.6);
-    bench.assert_not_engaged(Reason::NoFront);
-}
-
-#[test]
 fn rear_far_or_absent() {
     let mut bench = Bench::new();
     bench.rear().state[0] = -100.1 - CAR_M;
