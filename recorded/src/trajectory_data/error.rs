@@ -282,7 +282,7 @@ pub enum TrajectoryFileProblem {
     },
     /// A long file is not sorted by vehicle.
     #[error(
-        "vehicle {vehicle} goes on here after rows of others; a data of more than {rows} rows has to be sorted by \
+        "vehicle {vehicle} goes on here after rows of others; a file of more than {rows} rows has to be sorted by \
          vehicle or by time throughout"
     )]
     NotByVehicle {
@@ -293,7 +293,7 @@ pub enum TrajectoryFileProblem {
     },
     /// A long file is not sorted by time.
     #[error(
-        "time goes back by {back_s} s; a data of more than {rows} rows has to be sorted by vehicle or by time \
+        "time goes back by {back_s} s; a file of more than {rows} rows has to be sorted by vehicle or by time \
          throughout"
     )]
     NotByTime {

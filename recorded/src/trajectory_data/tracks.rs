@@ -320,7 +320,7 @@ impl<'a> Tracks<'a> {
 
     /// Returns the duration of all tracks so far together (s).
     fn recorded_s(&self) -> f64 {
-        self.rows as f64 * self.period.s()
+        (self.rows - self.builder.continuity().repeated_rows) as f64 * self.period.s()
     }
 
     /// Returns the share of the lane changes that jumps cut off (-), if a result is in doubt by it.
