@@ -1,5 +1,5 @@
 //! Whether the results in a campaign's folder can be believed. A campaign whose verdict is INVALID is
-//! neither a baseline nor compared with one.
+//! neither a baseline nor compared with one, and nothing is computed from its shares.
 //!
 //! ```text
 //!  records ───────────────────────▶ validity checks, expectations ─┐
@@ -17,7 +17,7 @@ use crate::summary::Summary;
 use crate::verdict::disbelief;
 
 /// Gathers what speaks against the results in a folder, record by record.
-pub(crate) struct Belief {
+pub struct Belief {
     path: PathBuf,
     changes: Vec<String>,
     summary: Summary,
@@ -31,7 +31,7 @@ impl Belief {
     ///
     /// # Errors
     /// [`FolderError`] if the folder cannot be read, or holds a part of a campaign.
-    pub(crate) fn of(folder: &Folder, max_flip_rate: f64) -> Result<Self, FolderError> {
+    pub fn of(folder: &Folder, max_flip_rate: f64) -> Result<Self, FolderError> {
         let manifest = folder.manifest()?;
         if let Some(part) = manifest.partition {
             return Err(FolderError::Part { path: folder.path().to_owned(), part });
@@ -47,7 +47,7 @@ impl Belief {
     }
 
     /// Adds a record.
-    pub(crate) fn push(&mut self, record: &Record) {
+    pub fn push(&mut self, record: &Record) {
         self.summary.push(record);
         self.judge.push(record);
     }
@@ -56,7 +56,7 @@ impl Belief {
     ///
     /// # Errors
     /// [`FolderError::Invalid`] if the results cannot be believed.
-    pub(crate) fn check(self) -> Result<(), FolderError> {
+    pub fn check(self) -> Result<(), FolderError> {
         let found = disbelief(&self.summary, &self.judge, self.max_flip_rate);
         let reasons: Vec<String> = self.changes.into_iter().chain(found).collect();
         if reasons.is_empty() { Ok(()) } else { Err(FolderError::Invalid { path: self.path, reasons }) }

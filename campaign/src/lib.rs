@@ -22,7 +22,7 @@ pub mod arguments;
 pub mod arm_pairs;
 pub mod attribution;
 pub mod baseline;
-pub(crate) mod belief;
+pub mod belief;
 pub mod boundary;
 mod campaign_error;
 pub mod compare;

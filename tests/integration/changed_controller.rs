@@ -108,9 +108,13 @@ fn a_campaign_whose_controller_changed_is_no_baseline_and_is_not_compared() {
                    [ $n -ge 4 ] && [ ! -e edited ] && { : > edited; echo '# more' >> own.sh; }\n";
     fs::write(&script, format!("{changes}{STEADY}")).unwrap();
     run("bad", 7);
-    for words in
-        ["baseline save bad bad.json", "baseline compare bad good.json", "compare good bad", "compare bad good"]
-    {
+    for words in [
+        "baseline save bad bad.json",
+        "baseline compare bad good.json",
+        "compare good bad",
+        "compare bad good",
+        "study exposure --campaign bad",
+    ] {
         let output = closecall(words);
         assert_eq!(code(&output), 7, "{words}: {}", stderr(&output));
         assert!(message(&output).contains("the controller changed during the campaign"), "{}", stderr(&output));

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use closecall_campaign::belief::Belief;
+use closecall_campaign::gate::MAX_FLIP_RATE;
 use closecall_campaign::ledger::Pairs;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::summary::Summary;
@@ -161,11 +163,12 @@ pub fn exposure(
 /// out if the campaign has only one. An unpaired campaign has no samples.
 ///
 /// # Errors
-/// [`CausesError`] if the folder cannot be read, there is no such scenario, or the lead vehicle
-/// does not brake in it.
+/// [`CausesError`] if the folder cannot be read or its results cannot be believed, there is no such
+/// scenario, or the lead vehicle does not brake in it.
 pub fn shares_of(saved: &SavedCampaign, scenario: Option<&str>) -> Result<CampaignShares, CausesError> {
     let name = saved.file(scenario)?.config().name.clone();
     let mut summary = Summary::of(&saved.works()?);
+    let mut belief = Belief::of(saved.folder(), MAX_FLIP_RATE)?;
     let (mut runs, mut braked) = (0_u64, 0_u64);
     for record in saved.folder().complete_records()? {
         let record = record?;
@@ -176,7 +179,9 @@ pub fn shares_of(saved: &SavedCampaign, scenario: Option<&str>) -> Result<Campai
             braked += u64::from(baseline.moment(Moment::FrontBrakes).is_some());
         }
         summary.push(&record);
+        belief.push(&record);
     }
+    belief.check()?;
     let lead_braked_share = braked as f64 / runs.max(1) as f64;
     if runs > 0 && lead_braked_share < LEAD_BRAKES_SHARE {
         return Err(CausesError::OtherEncounter { scenario: name, braked, runs });
