@@ -6,7 +6,7 @@
 
 use std::hint::black_box;
 
-use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, Scanner};
+use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, LidarScan, Scanner};
 use closecall_sensors::tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_sensors::{Detection, FullPerception, NoiseKey, Perception, Scene, SceneVehicle, Sensors, SensorsConfig};
 use closecall_traffic::{
@@ -41,10 +41,36 @@ fn others(gap_m: f64) -> [SceneVehicle; 3] {
     ]
 }
 
-/// Returns a scene with the ego and these other vehicles on a clear day.
-fn scene<'a>(road: &'a Road, others: &'a [SceneVehicle]) -> Scene<'a> {
-    let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
-    Scene { time: Time::ZERO, road, environment: &Environment::CLEAR_DAY, ego, others }
+/// A road on a clear day, with the ego and other vehicles.
+struct View {
+    road: Road,
+    ego: SceneVehicle,
+    others: [SceneVehicle; 3],
+}
+
+impl View {
+    /// Returns the view with a rear vehicle at this distance (m).
+    fn new(gap_m: f64) -> Self {
+        let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
+        Self { road: Road::straight(3), ego, others: others(gap_m) }
+    }
+
+    fn scene(&self, time: Time) -> Scene<'_> {
+        let Self { road, ego, others } = self;
+        Scene { time, road, environment: &Environment::CLEAR_DAY, ego: *ego, others }
+    }
+
+    /// Returns a scan, and where its lanes are.
+    fn scan(&self) -> (LidarScan, LaneGeometry) {
+        let scene = self.scene(Time::ZERO);
+        (Scanner::new(Lidar::default()).scan(&scene, &mut random()).clone(), LaneGeometry::from_scene(&scene))
+    }
+
+    /// All vehicles drive on for a control step.
+    fn drive(&mut self) {
+        let vehicles = self.others.iter_mut().chain([&mut self.ego]);
+        vehicles.for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * CONTROL_STEP.s());
+    }
 }
 
 fn random() -> Stream {
@@ -107,51 +133,39 @@ fn main() {
 
 #[divan::bench(args = GAPS_M)]
 fn scan(bencher: Bencher<'_, '_>, gap_m: f64) {
-    let (road, others) = (Road::straight(3), others(gap_m));
-    let scene = self::scene(&road, &others);
-    let (mut scanner, mut rng) = (Scanner::new(Lidar::default()), random());
+    let view = View::new(gap_m);
+    let (scene, mut scanner, mut rng) = (view.scene(Time::ZERO), Scanner::new(Lidar::default()), random());
     bencher.bench_local(|| scanner.scan(black_box(&scene), &mut rng).len());
 }
 
 #[divan::bench(args = GAPS_M)]
 fn clustering(bencher: Bencher<'_, '_>, gap_m: f64) {
-    let (road, others) = (Road::straight(3), others(gap_m));
-    let scene = self::scene(&road, &others);
-    let (mut scanner, mut detector) = (Scanner::new(Lidar::default()), Detector::default());
-    let (scan, lane) = (scanner.scan(&scene, &mut random()), LaneGeometry::from_scene(&scene));
-    bencher.bench_local(|| detector.cluster(black_box(scan), &lane).expect("finite points"));
+    let ((scan, lane), mut detector) = (View::new(gap_m).scan(), Detector::default());
+    bencher.bench_local(|| detector.cluster(black_box(&scan), &lane).expect("finite points"));
 }
 
 #[divan::bench(args = GAPS_M)]
 fn clustering_and_boxes(bencher: Bencher<'_, '_>, gap_m: f64) {
-    let (road, others) = (Road::straight(3), others(gap_m));
-    let scene = self::scene(&road, &others);
-    let (mut scanner, mut detector) = (Scanner::new(Lidar::default()), Detector::default());
-    let (scan, lane) = (scanner.scan(&scene, &mut random()), LaneGeometry::from_scene(&scene));
-    bencher.bench_local(|| detector.detect(black_box(scan), &lane).expect("finite points").len());
+    let ((scan, lane), mut detector) = (View::new(gap_m).scan(), Detector::default());
+    bencher.bench_local(|| detector.detect(black_box(&scan), &lane).expect("finite points").len());
 }
 
 #[divan::bench(args = GAPS_M)]
 fn tracking(bencher: Bencher<'_, '_>, gap_m: f64) {
-    let (road, others) = (Road::straight(3), others(gap_m));
-    let scene = self::scene(&road, &others);
-    let (mut scanner, mut detector) = (Scanner::new(Lidar::default()), Detector::default());
-    let (scan, lane) = (scanner.scan(&scene, &mut random()), LaneGeometry::from_scene(&scene));
-    let detections = detector.detect(scan, &lane).expect("finite points").to_vec();
-    let mut tracker_loop = TrackerLoop::new(road);
+    let view = View::new(gap_m);
+    let (scan, lane) = view.scan();
+    let detections = Detector::default().detect(&scan, &lane).expect("finite points").to_vec();
+    let mut tracker_loop = TrackerLoop::new(view.road);
     bencher.bench_local(|| tracker_loop.step(black_box(&detections)));
 }
 
 /// The step includes the radars.
 #[divan::bench(args = GAPS_M)]
 fn whole_step(bencher: Bencher<'_, '_>, gap_m: f64) {
-    let (road, mut others) = (Road::straight(3), others(gap_m));
-    let mut ego = scene(&road, &others).ego;
-    let (mut whole, mut time) = (full(), Time::ZERO);
+    let (mut view, mut whole, mut time) = (View::new(gap_m), full(), Time::ZERO);
     bencher.bench_local(|| {
         time += CONTROL_STEP;
-        others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * CONTROL_STEP.s());
-        let scene = Scene { time, ego, ..self::scene(&road, &others) };
-        whole.step(&scene).expect("finite").len()
+        view.drive();
+        whole.step(&view.scene(time)).expect("finite").len()
     });
 }
