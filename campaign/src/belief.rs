@@ -62,3 +62,16 @@ impl Belief {
         if reasons.is_empty() { Ok(()) } else { Err(FolderError::Invalid { path: self.path, reasons }) }
     }
 }
+
+/// Checks the results in the folder of a whole campaign.
+///
+/// # Errors
+/// [`FolderError`] if the folder cannot be read, holds a part of a campaign or lacks records, or its
+/// results cannot be believed.
+pub fn believe(folder: &Folder, max_flip_rate: f64) -> Result<(), FolderError> {
+    let mut belief = Belief::of(folder, max_flip_rate)?;
+    for record in folder.complete_records()? {
+        belief.push(&record?);
+    }
+    belief.check()
+}

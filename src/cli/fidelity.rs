@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::belief::believe;
+use closecall_campaign::gate::MAX_FLIP_RATE;
 use closecall_report::campaign::FidelityText;
 use closecall_report::json::stamped;
 use closecall_studies::fidelity::{FidelityReport, fidelity as estimate, time_ratios};
@@ -36,6 +38,9 @@ pub(super) struct FidelityArgs {
 
 pub(super) fn fidelity(args: &FidelityArgs) -> Result<ExitCode, CliError> {
     let (full, fast) = (args.saved.open(&args.full)?, args.saved.open(&args.fast)?);
+    for saved in [&full, &fast] {
+        believe(saved.folder(), MAX_FLIP_RATE)?;
+    }
     let reports = estimate(&full, &fast)?;
     match args.format {
         Format::Json => {

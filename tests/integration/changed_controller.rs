@@ -114,6 +114,7 @@ fn a_campaign_whose_controller_changed_is_no_baseline_and_is_not_compared() {
         "compare good bad",
         "compare bad good",
         "study exposure --campaign bad",
+        "study fidelity good bad",
     ] {
         let output = closecall(words);
         assert_eq!(code(&output), 7, "{words}: {}", stderr(&output));
