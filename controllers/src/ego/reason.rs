@@ -21,7 +21,7 @@ pub enum Reason {
     SurroundSensorsFailed,
     /// The system is not available, because the rear sensors have failed.
     RearSensorsFailed,
-    /// No vehicle is ahead in the lane of the ego.
+    /// There is no front time headway: no vehicle is ahead in the lane of the ego, or the ego stands.
     NoFront,
     /// The front time headway is already long enough.
     FrontMarginLong,
@@ -87,7 +87,7 @@ impl Reason {
             Self::FrontSensorFailed => "not available: front radar failed",
             Self::SurroundSensorsFailed => "not available: surround sensors failed",
             Self::RearSensorsFailed => "not available: rear sensors failed",
-            Self::NoFront => "no vehicle ahead",
+            Self::NoFront => "no front time headway (none ahead, or the ego stands)",
             Self::FrontMarginLong => "front time headway long enough",
             Self::NoRear => "no vehicle behind in the lane",
             Self::RearUnconfirmed => "track behind not confirmed",

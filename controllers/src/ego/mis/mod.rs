@@ -25,7 +25,7 @@
 //! |---|---|---|
 //! | the ego is in automated mode | `automated` | `NotAutomated` |
 //! | the system is available: no group of sensors has failed | front, surround and rear sensors work | `FrontSensorFailed`, `SurroundSensorsFailed`, `RearSensorsFailed` |
-//! | the ego follows a lead vehicle at a short margin | a track is ahead in the lane of the ego, and THW_F < `short-thw-s` | `NoFront`, `FrontMarginLong` |
+//! | the ego follows a lead vehicle at a short margin | a track is ahead in the lane of the ego, the ego moves, and THW_F < `short-thw-s` | `NoFront`, `FrontMarginLong` |
 //! | a rear vehicle is present | a track is behind with at least half of its probability in the lane of the ego; nearer tracks that are not confirmed or not classified as vehicles do not hide it | `NoRear` |
 //! | its track is established | confirmed, or coasting | `RearUnconfirmed` |
 //! | it is a vehicle | car, truck or motorcycle: together at least as probable as not, and one of them more probable than background | `RearUnclassified` |

@@ -165,7 +165,7 @@ const fn short_reason(reason: Reason) -> &'static str {
         Reason::NoMis => "no MIS",
         Reason::NotAutomated => "manual",
         Reason::FrontSensorFailed | Reason::SurroundSensorsFailed | Reason::RearSensorsFailed => "not available",
-        Reason::NoFront => "none ahead",
+        Reason::NoFront => "no headway",
         Reason::FrontMarginLong => "long enough",
         Reason::NoRear => "none behind",
         Reason::RearUnconfirmed => "not confirmed",
