@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from ._native import shown
+
 
 class ClosecallError(Exception):
     """A call without a result.
 
     ``exit_code`` is the exit code that the command line has. ``file``, ``line`` (from 1) and ``key`` say where the error
-    is, or are ``None``.
+    is, or are ``None``. Control characters that a file or a name brings into the message are shown as their numbers.
     """
 
     def __init__(
@@ -19,7 +21,7 @@ class ClosecallError(Exception):
         line: int | None = None,
         key: str | None = None,
     ) -> None:
-        super().__init__(message)
+        super().__init__(shown(message))
         self.exit_code = exit_code
         self.file = file
         self.line = line

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 from . import _native
 from ._command import call
@@ -32,6 +32,30 @@ def _flat(row: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     for key, value in row.items():
         flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
     return flat
+
+
+@overload
+def lane_changes(
+    file: PathLike,
+    *,
+    criterion: Literal["peak", "distance", "gradient"] = "peak",
+    lanes: Literal["recorded", "none"] = "recorded",
+    reference: None = None,
+    layout: Layout | None = None,
+    drop_bad_rows: bool = False,
+) -> Rows: ...
+
+
+@overload
+def lane_changes(
+    file: PathLike,
+    *,
+    criterion: Literal["peak", "distance", "gradient"] = "peak",
+    lanes: Literal["recorded", "none"] = "recorded",
+    reference: PathLike,
+    layout: Layout | None = None,
+    drop_bad_rows: bool = False,
+) -> dict[str, Any]: ...
 
 
 def lane_changes(

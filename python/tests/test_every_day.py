@@ -164,6 +164,26 @@ def test_a_measured_campaign_shows_itself_without_control_characters() -> None:
     assert not any(character in shown for character in ("\x1b", "\u202e")), shown
 
 
+def test_an_exception_shows_no_control_characters(tmp_path: Path) -> None:
+    file = tmp_path / "traffic.csv"
+    file.write_text("track_id,frame\x1b[31m\n1,2\n")
+
+    class Raises:
+        def step(self, input: cc.ControllerInput) -> float:
+            raise ValueError("\x1b[31m\x9b31m\u202e")
+
+    calls = [
+        lambda: cc.lane_changes(file),
+        lambda: cc.run("no\x1b[31m"),
+        lambda: cc.campaign(SCENARIO, **{"n\x1b": 3}),
+        lambda: cc.run(SCENARIO, Raises(), sensors="object"),
+    ]
+    for call in calls:
+        with pytest.raises(cc.ClosecallError, match=r"\\u001b") as raised:
+            call()
+        assert not re.search("[\x1b\x9b\u202e]", str(raised.value)), raised.value
+
+
 @pytest.mark.parametrize("keyword", [{"record": "failures:1"}, {"partition": "1/2"}])
 def test_what_is_kept_in_a_folder_needs_one(keyword: dict[str, str]) -> None:
     with pytest.raises(cc.UsageError, match="name one with `out`"):
