@@ -59,8 +59,8 @@ pub enum FolderError {
         /// What differs, one message for each difference.
         differences: Vec<String>,
     },
-    /// The folder is not empty, and does not hold a campaign.
-    #[error("failed to use {}: it is not empty and does not hold a campaign; name a new folder", path.display())]
+    /// The folder is not empty, and does not hold a campaign of this kind.
+    #[error("failed to use {}: it is not empty and does not hold a campaign of this kind; name a new folder", path.display())]
     NotACampaign {
         /// The folder.
         path: PathBuf,
