@@ -2,6 +2,7 @@
 
 use closecall_controllers::{ControllerError, DriverError};
 use closecall_sensors::SensorError;
+use closecall_traffic::statistics::format::exact;
 use closecall_traffic::{ActorId, ConfigError, Time};
 
 /// Largest acceleration that an ego controller may ask for, in either direction (m/s²). The tyres
@@ -42,7 +43,8 @@ pub enum SampleError {
     Controller(#[from] ControllerError),
     /// The acceleration that the ego controller commanded is no number that a vehicle could follow.
     #[error(
-        "the ego controller asked for an acceleration of {value} m/s² at {time}: it must be a number from -{limit} to {limit}",
+        "the ego controller asked for an acceleration of {} m/s² at {time}: it must be a number from -{limit} to {limit}",
+        exact(*.value),
         limit = LARGEST_COMMAND_MPS2
     )]
     Command {

@@ -65,9 +65,10 @@ pub(crate) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
     if object.get("type").and_then(Value::as_str) != Some("hello") {
         return Err(key_error(line, &object, "type", "\"hello\" in the first answer"));
     }
-    let version =
-        object.get("protocol").ok_or_else(|| key_error(line, &object, "protocol", "the version of the protocol"))?;
-    if version.as_u64() == Some(PROTOCOL.into()) {
+    let version = object.get("protocol").and_then(Value::as_u64).ok_or_else(|| {
+        key_error(line, &object, "protocol", "the version of the protocol, a whole number without quotes")
+    })?;
+    if version == u64::from(PROTOCOL) {
         let stated = |key| match object.get(key) {
             None | Some(Value::Null) => None,
             Some(Value::String(text)) => Some(excerpt(text.as_bytes())),
@@ -264,6 +265,8 @@ mod tests {
         let error = check_hello(br#"{"type":"hello","protocol":2}"#).unwrap_err().to_string();
         assert_eq!(error, "the process speaks version 2 of the protocol, this is version 1");
         assert!(check_hello(br#"{"type":"hello"}"#).unwrap_err().to_string().contains("absent"));
+        let error = check_hello(br#"{"type":"hello","protocol":"1"}"#).unwrap_err().to_string();
+        assert!(error.ends_with("a whole number without quotes, it is \"1\""), "{error}");
         assert!(check_hello(br#"{"acceleration_mps2":0,"state":"following"}"#).is_err());
     }
 }
