@@ -7,6 +7,7 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_report::run::figure::{PictureFile, encounter, parse_width_mm};
 use closecall_report::run::film::{Film, Level, film_arms};
 use closecall_scenarios::Scenario;
+use closecall_scenarios::causal::LETTERS;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::{Arm, RunKey};
@@ -18,7 +19,7 @@ use super::backend::check_backend_of;
 use super::help::{examples, heading};
 use super::output::{during, print_error, print_written, textln};
 use super::protect::{files_of_campaign, files_of_scenario, protect};
-use super::saved::{TrustArgs, difference_from_journal};
+use super::saved::{TrustArgs, check_record, difference_from_journal};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
@@ -67,6 +68,7 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
     for film in &films {
         textln!("{}: {}", film.title(), film.headline());
     }
+    textln!("{LETTERS}");
     print_written(args.output.path());
     Ok(difference.map_or(ExitCode::Pass, |difference| {
         print_error(format_args!("{difference}\n"));
@@ -116,7 +118,7 @@ fn films_of_campaign(args: &PlotArgs) -> Result<(Vec<Film>, Option<String>), Cli
     saved.limit(timeout_ms, memory_mib);
     let mut arms = saved.arms()?;
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
-    saved.folder().check_journal()?;
+    check_record(saved.folder(), &scenario.name, sample)?;
     if args.comparison.paired && arms.len() < 2 {
         let sensors = arms.first().and_then(|tested| tested.sensors);
         arms.insert(0, Arm { controller: ControllerChoice::ACC.factory(), sensors });

@@ -10,6 +10,7 @@ use closecall_report::json::stamped;
 use closecall_report::run::film::{EncounterComparison, film_encounter};
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::reenactment::Reenactment;
+use closecall_scenarios::causal::LETTERS;
 use closecall_scenarios::{RearDriver, reenact as scenario_of};
 use closecall_simulation::{CONTROL_STEP, RunKey};
 use closecall_traffic::atomic::write_file;
@@ -19,7 +20,7 @@ use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs, read_noting};
 use super::error::MAX_SUGGESTED;
 use super::help::{examples, heading};
-use super::output::{made_by, outln, print_text, print_written};
+use super::output::{made_by, outln, print_text, print_written, textln};
 use super::protect::{files_of_trajectories, must_be_writable, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
@@ -107,7 +108,10 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let reenactment = Reenactment { encounter: &encounter, comparison: &comparison, films: &films, outcome: &outcome };
     match args.format {
         Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
-        Format::Human => print_text(reenactment),
+        Format::Human => {
+            print_text(reenactment);
+            textln!("{LETTERS}");
+        }
     }
     Ok(code)
 }

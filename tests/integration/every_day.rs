@@ -323,6 +323,14 @@ fn wherever_letters_name_vehicles_a_line_says_which() {
     let run = ["run", "low-thw-overtake", "--sensors", "object"];
     assert_eq!(times(&stdout(&closecall(run.iter().chain(&["--paired"])), 0)), 1);
     assert_eq!(times(&stdout(&closecall(run.iter().chain(&["--format", "json"])), 0)), 0);
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (picture, traffic) = (at("a.svg"), at("traffic.csv"));
+    let plot = ["plot", "low-thw-overtake", "--sensors", "object", "-o", &picture];
+    assert_eq!(times(&stdout(&closecall(plot), 0)), 1);
+    let record = ["traffic", "record", "low-thw-overtake", "-n", "3", "--sensors", "object", "-o", &traffic];
+    stdout(&closecall(record), 0);
+    let reenacted = stdout(&closecall(["traffic", "reenact", &traffic, "--sensors", "object"]), 0);
+    assert!(reenacted.contains("R crosses the marking") && times(&reenacted) == 1, "{reenacted}");
 }
 
 #[test]
