@@ -111,10 +111,22 @@ impl EndedEarly<'_> {
         })))
     }
 
+    fn sentence(&self) -> String {
+        let Self { done, all, message, .. } = self;
+        format!("ENDED EARLY, without a verdict: {message}; {done} of {all} samples are done")
+    }
+
+    /// Returns why samples failed, a line for each kind.
+    fn reasons(&self) -> impl Iterator<Item = String> {
+        self.summary.failures().map(|(scenario, failure)| format!("{scenario}: {failure}"))
+    }
+
     /// Returns the end as JSON.
     pub fn json(&self) -> Value {
         json!({
             "ended_early": self.message,
+            "sentence": self.sentence(),
+            "reasons": self.reasons().collect::<Vec<_>>(),
             "samples": self.done,
             "of": self.all,
             "errors": self.errors,
@@ -126,10 +138,9 @@ impl EndedEarly<'_> {
 
 impl fmt::Display for EndedEarly<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { done, all, message, .. } = self;
-        writeln!(f, "ENDED EARLY, without a verdict: {message}; {done} of {all} samples are done")?;
-        for (scenario, failure) in self.summary.failures() {
-            writeln!(f, "  {scenario}: {failure}")?;
+        writeln!(f, "{}", self.sentence())?;
+        for reason in self.reasons() {
+            writeln!(f, "  {reason}")?;
         }
         let (Some(resume), Some(Kept { folder, .. })) = (self.resume(), &self.kept) else {
             return writeln!(f, "nothing was kept: only a campaign with a folder can be resumed");

@@ -318,6 +318,9 @@ def test_a_campaign_that_ends_early_has_a_result(tmp_path: Path) -> None:
         resume = result.report["resume"]
         assert result.report["of"] == 20 and resume.startswith("closecall.campaign(") and resume.count("resume=True") == 1
         assert "fail_fast=True" not in resume
+        assert result.sentence.startswith("ENDED EARLY, without a verdict: ") and result.sentence.endswith("; 1 of 20 samples are done")
+        shown = result._repr_html_()
+        assert result.sentence in shown and "ValueError: at once" in shown, shown
 
 
 def test_the_settings_of_one_scenario_are_not_those_of_another() -> None:

@@ -578,7 +578,7 @@ impl Conclusion<'_> {
     /// Returns it for programs.
     pub(super) fn json(&self) -> Value {
         match self {
-            Self::Early(ended) => ended.json(),
+            Self::Early(ended) => json::stamped(ended.json(), None, None),
             Self::Judged(judged) => report_json(judged.report, judged.companion, judged.wall_s),
             Self::Corrected(value) => value.clone(),
         }

@@ -367,7 +367,10 @@ impl Rare<'_> {
         let resume = self.folder.map(|_| resume());
         let signal = session::received().map_or("stopped", Signal::name);
         match (self.format, resume) {
-            (Format::Json, resume) => outln!("{:#}", json!({ "ended_early": signal, "runs": runs, "resume": resume })),
+            (Format::Json, resume) => {
+                let ended = json!({ "ended_early": signal, "runs": runs, "resume": resume });
+                outln!("{:#}", stamped(ended, None, None));
+            }
             (Format::Human, resume) => {
                 textln!("ENDED EARLY, without a result: {signal}; runs that are done: {runs}");
                 match resume {
