@@ -96,13 +96,13 @@ def _check(perception: object) -> None:
 def main() -> int:
     """Answers the messages of a run with the object of the file that the first argument names."""
     _host.prepare()
-    # What the object prints must not be taken for an answer.
-    with os.fdopen(os.dup(1), "w", encoding="utf-8") as answers:
+    # What the object prints must not be taken for an answer. A text may hold a lone surrogate, which UTF-8 cannot.
+    with os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace") as answers:
         os.dup2(2, 1)
         own = _Own(sys.argv[1])
         sys.argv[:] = [""]
         for line in sys.stdin.buffer:
-            answers.write(json.dumps(own.answer(json.loads(line))) + "\n")
+            answers.write(json.dumps(own.answer(json.loads(line)), ensure_ascii=False) + "\n")
             answers.flush()
     return 0
 

@@ -175,6 +175,8 @@ class Misbehaves:
             return []
         if self.fault == "raises":
             raise ZeroDivisionError("of the perception")
+        if self.fault == "surrogate":
+            raise ValueError("a name with \udcff")
         if self.fault == "exit-0":
             raise SystemExit(0)
         if self.fault == "exit-9":
@@ -207,6 +209,7 @@ class Misbehaves:
 FAULTS = {
     "starts-not": "ValueError: no licence",
     "raises": "ZeroDivisionError: of the perception",
+    "surrogate": "ValueError: a name with ?",
     "exit-0": "the perception ended its process (exit status: 0)",
     "exit-9": "the perception ended its process (exit status: 9)",
     "crash": "the perception ended its process (signal: 11 (SIGSEGV)); it last wrote: ",
