@@ -299,18 +299,24 @@ pub const MEASURES: &[Measure] = &[
     number("max_jerk_mps3", JERK, "largest jerk of the ego before it collides", |outcome| {
         Some(outcome.margins.max_jerk_mps3)
     }),
-    number("max_speed_deficit_mps", SPEED, "most by which the ego is slower than the lead vehicle", |outcome| {
-        Some(outcome.margins.max_speed_deficit_mps)
-    }),
+    number(
+        "max_speed_deficit_mps",
+        SPEED,
+        "largest speed by which the ego is slower than the lead vehicle",
+        |outcome| Some(outcome.margins.max_speed_deficit_mps),
+    ),
     number(
         "unprompted_deficit_mps",
         SPEED,
-        "most by which the ego is slower than the lead vehicle before a vehicle behind gives a reason, and before the lead vehicle brakes",
+        "largest speed by which the ego is slower than the lead vehicle before a vehicle behind gives a reason, and before the lead vehicle brakes",
         |outcome| cost(outcome, |cost| cost.unprompted_deficit_mps),
     ),
-    number("time_lost_s", DURATION, "most by which the ego is late before the lead vehicle brakes", |outcome| {
-        cost(outcome, |cost| cost.time_lost_s)
-    }),
+    number(
+        "time_lost_s",
+        DURATION,
+        "longest time by which the ego is late before the lead vehicle brakes",
+        |outcome| cost(outcome, |cost| cost.time_lost_s),
+    ),
     number(
         "imposed_braking_mps2",
         NOT_NEGATIVE,
