@@ -10,6 +10,9 @@
 //! Between the hashes, a file counts as unchanged if its time of change, its length and its place
 //! on the disk are the same.
 //!
+//! A line that a process of a controller leaves over after its last sample makes the campaign
+//! INVALID, too: another process may have answered for it.
+//!
 //! The folder of the campaign keeps what has changed. The samples of the changed controller stay in
 //! its journal: a campaign that is resumed, or whose parts are merged, is no better for it.
 
@@ -21,7 +24,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use closecall_sensors::external::ProgramKind;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::controller::exec::ExecSettings;
+use closecall_simulation::controller::exec::{ExecSettings, take_left_over};
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::input::read_text;
 
@@ -108,13 +111,15 @@ impl ControllerWatch {
     }
 
     /// Hashes the files again, and keeps what has changed in the folder. Returns a message for each
-    /// file that differs from the start, or differed in between.
+    /// file that differs from the start, or differed in between, and for each line that a process
+    /// left over.
     ///
     /// # Errors
     /// [`WriteError`] if the folder cannot keep it.
     pub fn finish(mut self) -> Result<Vec<String>, WriteError> {
         let differs = |(path, file): &(&PathBuf, &Watched)| hash(path) != file.hash;
         self.changes.extend(self.files.iter().filter(differs).map(|(path, _)| change_of(path)));
+        self.changes.extend(take_left_over());
         self.keep()
     }
 }

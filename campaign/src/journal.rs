@@ -69,7 +69,7 @@ impl Journal {
     /// of the line, which [`read`] recognises.
     pub fn append(&mut self, record: &Record) -> Result<(), WriteError> {
         let line = line(record).map_err(|source| WriteError::new(&self.path, source))?;
-        self.file.write_all(&line).map_err(|source| WriteError::new(&self.path, source))?;
+        write_line(&mut self.file, &line).map_err(|source| WriteError::new(&self.path, source))?;
         if self.synced.elapsed() >= SYNC_EVERY { self.sync() } else { Ok(()) }
     }
 
@@ -81,6 +81,25 @@ impl Journal {
         self.synced = Instant::now();
         self.file.sync_data().map_err(|source| WriteError::new(&self.path, source))
     }
+}
+
+#[cfg(test)]
+thread_local! {
+    /// The bytes that still fit on the disk of a simulated world; `None` without a limit.
+    pub(crate) static FREE_BYTES: std::cell::Cell<Option<usize>> = const { std::cell::Cell::new(None) };
+}
+
+fn write_line(file: &mut File, line: &[u8]) -> io::Result<()> {
+    #[cfg(test)]
+    if let Some(free) = FREE_BYTES.get() {
+        let fits = free.min(line.len());
+        FREE_BYTES.set(Some(free - fits));
+        if fits < line.len() {
+            file.write_all(&line[..fits])?;
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+    }
+    file.write_all(line)
 }
 
 /// Returns the line of a record: its checksum, and the record as JSON.

@@ -159,6 +159,28 @@ fn a_library_that_forks_files_no_outcome_under_another_sample() {
     assert_eq!(left_behind(&mark), Vec::<String>::new());
 }
 
+/// The last sample of a process has nothing behind it that would find a line too many.
+#[test]
+fn a_line_that_a_forked_copy_leaves_over_after_the_last_sample_is_no_success() {
+    let folder = folder();
+    let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));
+    let run = |samples: &str, more: &[&str], out: &str| {
+        let mut command = program();
+        command
+            .args(["campaign", "low-thw-overtake", "-n", samples, "--sensors", "object", "--no-gate", "--jobs", "1"])
+            .args(["--record", "failures:0", "--controller", &library, "--out"])
+            .arg(folder.path().join(out))
+            .args(more);
+        with_fault(&mut command, Some("forks-behind"))
+    };
+    let text = stdout(&run("1", &["--no-validity-checks"], "last"), 7);
+    assert!(text.contains("INVALID: after its last sample, the process of `lib:faulty` failed"), "{text}");
+    // A resumption knows it.
+    stdout(&run("1", &["--no-validity-checks", "--resume"], "last"), 7);
+    // The process of a sample that repeats in a new one ends before.
+    stdout(&run("1", &[], "repeated"), 5);
+}
+
 #[test]
 fn a_worker_process_of_another_version_refuses_its_task_and_names_both() {
     let mut process = program()

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use closecall_sensors::camera::Backend;
@@ -11,7 +12,7 @@ use closecall_simulation::controller::exec::{Child, ExecError, keep_left_over};
 use closecall_simulation::controller::isolated::Isolated;
 use closecall_simulation::perception::hosted;
 
-use super::{Answer, Question, Refusal, Task, task_identity};
+use super::{Answer, Question, Refusal, Stage, Task, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, Flaky, SampleFailure};
 use crate::runner::{ArmRun, OnOutcome, Work};
@@ -29,6 +30,18 @@ pub(super) trait Peer {
     /// limits.
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError>;
 
+    /// Waits for one more answer to the last line. Returns `None` if there is none within `limit`.
+    ///
+    /// # Errors
+    /// [`ExecError`] if the process ends, or does not keep to its limits.
+    fn more_within(&mut self, limit: Duration) -> Result<Option<Vec<u8>>, ExecError>;
+
+    /// Lets the process end. `name` is the name of its controller in messages.
+    ///
+    /// # Errors
+    /// [`ExecError`] if a line is left over.
+    fn finish(&mut self, name: &str) -> Result<(), ExecError>;
+
     /// Lets the process be killed without time to end by itself.
     fn condemn(&mut self);
 }
@@ -36,6 +49,14 @@ pub(super) trait Peer {
 impl Peer for Child {
     fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         Self::request_within(self, line, limit)
+    }
+
+    fn more_within(&mut self, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        Self::more_within(self, limit)
+    }
+
+    fn finish(&mut self, name: &str) -> Result<(), ExecError> {
+        self.finish_unloading(name)
     }
 
     fn condemn(&mut self) {
@@ -89,8 +110,8 @@ thread_local! {
 pub(super) enum Trouble {
     /// The process crashed or hung. Another process may succeed.
     Crash(SampleFailure),
-    /// The time of the sample is over.
-    Late,
+    /// The time of the sample is over. It may have its run, without the checks.
+    Late(Option<Box<ArmRun>>),
     /// The process cannot be trusted.
     Other(SampleFailure),
 }
@@ -106,22 +127,26 @@ pub(crate) fn end(work: &Work) {
     CLIENT.with_borrow_mut(|client| client.end(work));
 }
 
-impl Client<OperatingSystem> {
-    fn end(&mut self, work: &Work) {
-        for (index, arm) in work.arms.iter().enumerate() {
-            let Some(mut worker) = self.workers.remove(&key(work, index)) else { continue };
-            let name = arm.controller.name();
-            if let Err(error) = worker.peer.finish_unloading(name) {
-                keep_left_over(name, &error);
-            }
-        }
-    }
-}
-
 impl<W: World> Client<W> {
     /// Returns a client without processes.
     pub(super) const fn new(world: W) -> Self {
         Self { world, workers: BTreeMap::new() }
+    }
+
+    /// Ends the processes of a work.
+    fn end(&mut self, work: &Work) {
+        for (index, arm) in work.arms.iter().enumerate() {
+            let name = arm.controller.name();
+            if let Err(error) = self.end_worker(work, index) {
+                keep_left_over(name, &error);
+            }
+        }
+    }
+
+    /// Ends the process of an arm, if there is one.
+    fn end_worker(&mut self, work: &Work, arm: usize) -> Result<(), ExecError> {
+        let worker = self.workers.remove(&key(work, arm));
+        worker.map_or(Ok(()), |mut worker| worker.peer.finish(work.arms[arm].controller.name()))
     }
 
     /// Runs one sample in a worker process.
@@ -139,25 +164,26 @@ impl<W: World> Client<W> {
         let mut crashes = 0;
         let failure = loop {
             let left = limit.saturating_sub(self.world.now() - started);
-            match self.ask(work, arm, sample, left, false) {
-                // The message does not depend on the time that the process has taken to start.
-                Err(Trouble::Late) => break SampleError::Timeout { limit_s: limit.as_secs_f64() }.into(),
-                Ok(Answer { record, wall_s, check_s, .. }) => {
-                    let flaky = first.map(|first| Flaky { crashes, first });
-                    let mut run = ArmRun { record: ArmRecord { flaky, ..record }, wall_s, check_s };
-                    let left = limit.saturating_sub(self.world.now() - started);
-                    self.repeat_in_new_process(work, arm, sample, &mut run, left, on_outcome);
-                    return run;
-                }
+            // The message does not depend on the time that the process has taken to start.
+            let late = SampleError::Timeout { limit_s: limit.as_secs_f64() };
+            let mut run = match self.ask((work, arm, sample), left, Some(on_outcome)) {
+                Ok(Answer { record, wall_s, check_s, .. }) => ArmRun { record, wall_s, check_s },
+                Err(Trouble::Late(Some(run))) => run.unchecked(&late),
+                Err(Trouble::Late(None)) => break late.into(),
                 Err(Trouble::Other(failure)) => break failure,
                 Err(Trouble::Crash(failure)) => {
                     crashes += 1;
                     first.get_or_insert(failure);
+                    match first.take_if(|_| crashes > work.retry_crashed) {
+                        Some(failure) => break failure,
+                        None => continue,
+                    }
                 }
-            }
-            if let Some(failure) = first.take_if(|_| crashes > work.retry_crashed) {
-                break failure;
-            }
+            };
+            run.record.flaky = first.map(|first| Flaky { crashes, first });
+            let left = limit.saturating_sub(self.world.now() - started);
+            self.repeat_in_new_process(work, arm, sample, &mut run, left, on_outcome);
+            return run;
         };
         ArmRun {
             record: ArmRecord::new(work.arms[arm].controller.name().to_owned(), Err(failure)),
@@ -170,7 +196,8 @@ impl<W: World> Client<W> {
     /// outcome. A controller whose answers depend on its process, such as on its number or on its
     /// environment, repeats itself in one process. `limit` is the time that is left.
     ///
-    /// The first process ends before: a licence or a device may serve one process at a time.
+    /// The first process ends before: a licence or a device may serve one process at a time. A line
+    /// that it leaves over is an error of the sample.
     fn repeat_in_new_process(
         &mut self,
         work: &Work,
@@ -187,8 +214,11 @@ impl<W: World> Client<W> {
         }
         on_outcome(run);
         let started = self.world.now();
-        drop(self.workers.remove(&key(work, arm)));
-        let answer = self.ask(work, arm, sample, limit, true);
+        if let Err(error) = self.end_worker(work, arm) {
+            run.record = ArmRecord::new(run.record.controller.clone(), Err(failure(&error)));
+            return;
+        }
+        let answer = self.ask((work, arm, sample), limit, None);
         run.check_s += (self.world.now() - started).as_secs_f64();
         let (Ok(outcome), Some(checks)) = (&run.record.result, &mut run.record.checks) else { return };
         let failure = match answer.map(|answer| answer.record.result) {
@@ -197,21 +227,22 @@ impl<W: World> Client<W> {
                 return;
             }
             Ok(Err(failure)) | Err(Trouble::Crash(failure) | Trouble::Other(failure)) => failure.message,
-            Err(Trouble::Late) => "the time of the sample is over".to_owned(),
+            Err(Trouble::Late(_)) => "the time of the sample is over".to_owned(),
         };
         checks.not_checked = Some(format!("{}: {failure}", Invariance::Repetition.name()));
     }
 
     /// Asks the process of an arm for one sample. Starts a process if there is none. Only a process
-    /// that has answered is kept. `limit` is the time that is left.
+    /// that has answered is kept. `limit` is the time that is left. `on_outcome` gets the outcome if
+    /// checks follow; a run without it only repeats the sample.
     fn ask(
         &mut self,
-        work: &Work,
-        arm: usize,
-        sample: u64,
+        (work, arm, sample): (&Work, usize, u64),
         limit: Duration,
-        is_repetition: bool,
+        on_outcome: Option<&OnOutcome<'_>>,
     ) -> Result<Answer, Trouble> {
+        let asked_at = self.world.now();
+        let is_repetition = on_outcome.is_none();
         let key = key(work, arm);
         let mut worker = match self.workers.remove(&key) {
             Some(worker) => worker,
@@ -222,16 +253,30 @@ impl<W: World> Client<W> {
         };
         worker.asked += 1;
         let question = Question { task: worker.task.clone(), arm, sample, number: worker.asked, is_repetition };
-        let answer = match worker.peer.request_within(line(&question), limit) {
-            Ok(Some(line)) => self.world.read(work, &question, &line),
-            Ok(None) => Err(Trouble::Late),
-            Err(error @ (ExecError::OutOfTurn { .. } | ExecError::LongLine { .. })) => {
-                Err(Trouble::Other(failure(&error)))
+        let mut received = worker.peer.request_within(line(&question), limit);
+        let mut outcome = None;
+        let answer = loop {
+            let answer = match received {
+                Ok(Some(line)) => self.world.read(work, &question, &line),
+                Ok(None) => Err(Trouble::Late(outcome.take())),
+                Err(error @ (ExecError::OutOfTurn { .. } | ExecError::LongLine { .. })) => {
+                    Err(Trouble::Other(failure(&error)))
+                }
+                Err(error) => Err(Trouble::Crash(failure(&error))),
+            };
+            match answer {
+                Ok(Answer { stage: Stage::ChecksFollow, record, wall_s, check_s, .. }) if outcome.is_none() => {
+                    let run = ArmRun { record, wall_s, check_s };
+                    on_outcome.iter().for_each(|on_outcome| on_outcome(&run));
+                    outcome = Some(Box::new(run));
+                    received = worker.peer.more_within(limit.saturating_sub(self.world.now() - asked_at));
+                }
+                Ok(Answer { stage: Stage::ChecksFollow, .. }) => break Err(wrong("it has the outcome twice")),
+                answer => break answer,
             }
-            Err(error) => Err(Trouble::Crash(failure(&error))),
         };
         match &answer {
-            Ok(answer) if !answer.is_last => drop(self.workers.insert(key, worker)),
+            Ok(answer) if answer.stage != Stage::Last => drop(self.workers.insert(key, worker)),
             Ok(_) => {}
             // A process that has answered another question may go on writing.
             Err(_) => worker.peer.condemn(),
@@ -245,15 +290,17 @@ fn key(work: &Work, arm: usize) -> (usize, usize) {
     (std::ptr::from_ref(work) as usize, arm)
 }
 
+fn wrong(difference: impl fmt::Display) -> Trouble {
+    let message = format!("the answer of the controller's process does not belong to the sample: {difference}");
+    Trouble::Other(SampleFailure { kind: KIND.to_owned(), message })
+}
+
 /// Reads the answer to a question, and checks that it is one.
 pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answer, Trouble> {
-    let wrong = |difference: String| {
-        let message = format!("the answer of the controller's process does not belong to the sample: {difference}");
-        Trouble::Other(SampleFailure { kind: KIND.to_owned(), message })
-    };
-    let answer: Answer = serde_json::from_slice(line).map_err(|error| wrong(format!("it cannot be read: {error}")))?;
+    let answer: Answer =
+        serde_json::from_slice(line).map_err(|error| wrong(format_args!("it cannot be read: {error}")))?;
     if let Some(process) = answer.copied_from {
-        return Err(wrong(format!(
+        return Err(wrong(format_args!(
             "a copy of the process gave it, because the controller has forked process {process} and both go on"
         )));
     }
@@ -261,16 +308,17 @@ pub(super) fn read(work: &Work, question: &Question, line: &[u8]) -> Result<Answ
         return Ok(answer);
     }
     if answer.question != *question {
-        return Err(wrong(format!("it answers {} instead of {question}", answer.question)));
+        return Err(wrong(format_args!("it answers {} instead of {question}", answer.question)));
     }
     let name = work.arms[question.arm].controller.name();
     if answer.record.controller != name {
-        return Err(wrong(format!("it comes from the controller `{}` instead of `{name}`", answer.record.controller)));
+        let there = &answer.record.controller;
+        return Err(wrong(format_args!("it comes from the controller `{there}` instead of `{name}`")));
     }
     work.identity().check_arm(&answer.record, question.sample, &mut None).map_err(wrong)?;
-    match (&answer.record.result, answer.is_last) {
+    match (&answer.record.result, answer.stage) {
         // The process hangs in a call, and ends after this answer.
-        (Err(failure), true) => Err(Trouble::Crash(failure.clone())),
+        (Err(failure), Stage::Last) => Err(Trouble::Crash(failure.clone())),
         _ => Ok(answer),
     }
 }

@@ -15,7 +15,11 @@
 //!
 //! An answer repeats its question. Foreign code can copy its process (`fork`) and so answer twice:
 //! an answer to another question, an answer of a copy, and a line that is left over before the next
-//! question each end the process and the sample with an error.
+//! question each end the process and the sample with an error. A line that is left over at the end
+//! of a process makes the campaign INVALID.
+//!
+//! A sample whose checks follow has its outcome in an answer of its own, before the answer with the
+//! checks: if the checks take too long, the sample keeps its outcome.
 //!
 //! A process that starts late may find another file, or be another version of this program. It then
 //! refuses its task, which ends the campaign.
@@ -139,6 +143,17 @@ struct Answer<Q = Question> {
     wall_s: f64,
     /// Wall time of the validity checks (s).
     check_s: f64,
-    /// True if the process ends after this answer.
-    is_last: bool,
+    /// Whether another answer follows, or none at all.
+    stage: Stage,
+}
+
+/// What follows an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+enum Stage {
+    /// The answer has the outcome alone: the answer with the checks of the sample follows.
+    ChecksFollow,
+    /// The sample is done.
+    Done,
+    /// The sample is done, and the process ends.
+    Last,
 }

@@ -19,7 +19,7 @@ use closecall_simulation::controller::native::{Probe, UNPACKED};
 use closecall_simulation::perception::{hosted, probe_library, serve_library};
 use closecall_simulation::{Arm, SampleError};
 
-use super::{Answer, CHANGED, Question, Task, UNREADABLE, task_identity};
+use super::{Answer, CHANGED, Question, Stage, Task, UNREADABLE, task_identity};
 use crate::manifest::version;
 use crate::record::{ArmRecord, SampleFailure};
 use crate::runner::{ArmRun, Work};
@@ -158,7 +158,7 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
             };
             // The process ends after this. If the answer is lost, its end is the error of the
             // sample.
-            answering.answer(question, run, true).ok();
+            answering.answer(question, run, Stage::Last).ok();
         }
     };
     watch::start(Duration::from_millis(timeout_ms), late).map_err(|error| error.to_string())?;
@@ -172,9 +172,15 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
         *lock(&current) = Current { question: Some(question.clone()), outcome: None };
         is_answered.store(false, Ordering::SeqCst);
         let asked = if question.is_repetition { &unchecked } else { &work };
-        let run = asked.run(question.sample, 0, limit, &|run| lock(&current).outcome = Some(run.clone()));
+        let run = asked.run(question.sample, 0, limit, &|run| {
+            lock(&current).outcome = Some(run.clone());
+            if !is_answered.load(Ordering::SeqCst) {
+                // If it is lost, so is the answer of the sample, which reports it.
+                answering.answer(Some(&question), run.clone(), Stage::ChecksFollow).ok();
+            }
+        });
         if !is_answered.swap(true, Ordering::SeqCst) {
-            answering.answer(Some(question), run, false)?;
+            answering.answer(Some(question), run, Stage::Done)?;
         }
     }
     Ok(())
@@ -210,7 +216,7 @@ fn refuse(
     let failure = SampleFailure { kind: kind.to_owned(), message };
     let record = ArmRecord::new(String::new(), Err(failure));
     let answering = Answering { answers: answers.clone(), process: std::process::id() };
-    answering.answer(question, ArmRun { record, wall_s: 0.0, check_s: 0.0 }, true)
+    answering.answer(question, ArmRun { record, wall_s: 0.0, check_s: 0.0 }, Stage::Last)
 }
 
 fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, String> {
@@ -227,10 +233,10 @@ struct Answering {
 }
 
 impl Answering {
-    fn answer<Q: serde::Serialize>(&self, question: Q, run: ArmRun, is_last: bool) -> Result<(), String> {
+    fn answer<Q: serde::Serialize>(&self, question: Q, run: ArmRun, stage: Stage) -> Result<(), String> {
         let ArmRun { record, wall_s, check_s } = run;
         let copied_from = (std::process::id() != self.process).then_some(self.process);
-        let answer = Answer { question, copied_from, record, wall_s, check_s, is_last };
+        let answer = Answer { question, copied_from, record, wall_s, check_s, stage };
         let mut line = serde_json::to_vec(&answer).map_err(|error| error.to_string())?;
         line.push(b'\n');
         lock(&self.answers).write_all(&line).map_err(|error| error.to_string())

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use closecall_simulation::controller::exec::ExecError;
+use rand::RngExt;
 
 use super::process::{Process, State, Truth, lock};
 use super::schedule::Violation;
@@ -118,6 +119,9 @@ impl SampleRunner for Machine {
                 return Ok(());
             }
             let run = |arm: usize| {
+                if lock(&self.state).has_signal() {
+                    stop.set();
+                }
                 lock(&self.state).crashes = 0;
                 let mut run = self.client.lock().unwrap().run((work, arm, sample), LIMIT, &|_| ());
                 if self.reader == Reader::Silent {
@@ -132,6 +136,10 @@ impl SampleRunner for Machine {
                 run
             };
             let runs: Vec<_> = (0..work.arms.len()).map(run).collect();
+            // Samples that run may take too long to be waited for.
+            if stop.is_set() && lock(&self.state).random.random() {
+                return Ok(());
+            }
             let wall_s = runs.iter().map(|run| run.wall_s).collect();
             let arms = runs.into_iter().map(|run| run.record).collect();
             let record = Record { scenario: work.scenario().to_owned(), sample, arms };

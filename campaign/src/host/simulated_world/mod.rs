@@ -3,16 +3,16 @@
 //!
 //! ```text
 //!  seed ─▶ faults ─▶ simulated processes ─▶ Client ─▶ Campaign::run ─▶ journal ─▶ resume ─▶ verdict
-//!                 └▶ kills, damaged journals ─────────────────────────────┘
+//!                 └▶ signals, kills, full disks, damaged journals ────────┘
 //! ```
 //!
-//! A schedule tests the real client, campaign, journal, repair and verdict. Only processes and
-//! clock are simulated. It runs a small campaign in a folder, interrupts and resumes it, and ends
+//! A schedule tests the real client, campaign, journal, repair and verdict. Only processes, clock,
+//! signals and the room on the disk are simulated. It runs a small campaign in a folder, interrupts and resumes it, and ends
 //! with a run without faults. Whatever happens,
 //!
 //! 1. every outcome in the journal belongs to the sample under which it is filed,
 //! 2. no verdict and no baseline comes from a part of the samples,
-//! 3. no PASS hides a sample without an outcome,
+//! 3. no PASS hides a sample without an outcome, and a record that the journal lacks is told,
 //! 4. a check that takes too long is no defect of the simulator, and runs again on request,
 //! 5. the last run completes the campaign to the records of an undisturbed one.
 //!

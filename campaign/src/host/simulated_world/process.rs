@@ -12,7 +12,7 @@ use closecall_traffic::Stream;
 use rand::RngExt;
 
 use crate::host::client::Peer;
-use crate::host::{Answer, Question};
+use crate::host::{Answer, Question, Stage};
 use crate::record::{ArmRecord, SampleFailure};
 use crate::validity::ArmChecks;
 
@@ -31,7 +31,9 @@ pub(super) struct State {
     pub(super) random: Stream,
     /// Probability of a fault at each question (-).
     pub(super) rate: f64,
-    /// Number of faults so far.
+    /// Probability of a signal that ends the program, at each question (-).
+    pub(super) signal_rate: f64,
+    /// Number of faults and signals so far.
     pub(super) faults: u64,
     /// Number of crashes so far in the run that the present question asks for: one sample in one
     /// arm.
@@ -41,9 +43,18 @@ pub(super) struct State {
 impl State {
     /// Draws whether there is a fault now.
     pub(super) fn has_fault(&mut self) -> bool {
-        let is_faulty = self.rate > 0.0 && self.random.random_bool(self.rate);
-        self.faults += u64::from(is_faulty);
-        is_faulty
+        self.draw(self.rate)
+    }
+
+    /// Draws whether a signal arrives now.
+    pub(super) fn has_signal(&mut self) -> bool {
+        self.draw(self.signal_rate)
+    }
+
+    fn draw(&mut self, rate: f64) -> bool {
+        let happens = rate > 0.0 && self.random.random_bool(rate);
+        self.faults += u64::from(happens);
+        happens
     }
 }
 
@@ -111,9 +122,17 @@ enum Fault {
     /// The process reports that a call hangs in a validity check, and ends. The sample already has
     /// its outcome.
     HangingCheck,
+    /// The process gives the outcome, and the answer with the checks after the time limit.
+    SlowChecks,
+    /// The process gives the outcome, and ends in the checks.
+    CrashInCheck,
+    /// The process gives the outcome, and a copy of it the answer with the checks.
+    CopyInCheck,
+    /// The process gives the outcome twice.
+    OutcomeTwice,
 }
 
-const FAULTS: [Fault; 17] = [
+const FAULTS: [Fault; 21] = [
     Fault::Twice,
     Fault::EarlierAgain,
     Fault::AnotherSample,
@@ -131,6 +150,10 @@ const FAULTS: [Fault; 17] = [
     Fault::Late,
     Fault::HangingCall,
     Fault::HangingCheck,
+    Fault::SlowChecks,
+    Fault::CrashInCheck,
+    Fault::CopyInCheck,
+    Fault::OutcomeTwice,
 ];
 
 impl Process {
@@ -149,15 +172,21 @@ impl Process {
     fn answer(&self, question: &Question, arm: usize, sample: u64) -> Answer {
         let records = &self.truth[arm];
         let record = records[usize::try_from(sample).unwrap() % records.len()].clone();
-        Answer { question: question.clone(), copied_from: None, record, wall_s: 0.01, check_s: 0.0, is_last: false }
+        let (question, stage) = (question.clone(), Stage::Done);
+        Answer { question, copied_from: None, record, wall_s: 0.01, check_s: 0.0, stage }
     }
 
     /// Runs a sample: writes the lines of the process into the pipe, each with its time of arrival.
     fn serve(&mut self, state: &mut State, question: &Question, limit: Duration) {
         let right = self.answer(question, self.arm, question.sample);
+        let outcome = Answer { stage: Stage::ChecksFollow, ..self.answer(question, self.arm, question.sample) };
         let at = state.now + ANSWER_TIME;
         let line = |answer: &Answer| Arrival::Line(serde_json::to_vec(answer).unwrap());
         if !state.has_fault() {
+            // Some samples are checked.
+            if question.sample.is_multiple_of(2) {
+                self.write(at, line(&outcome));
+            }
             return self.write(at, line(&right));
         }
         // A time before the next question, or during it.
@@ -221,15 +250,32 @@ impl Process {
             Fault::HangingCall => {
                 let failure = SampleFailure { kind: "controller".to_owned(), message: "no answer in time".to_owned() };
                 let record = ArmRecord::new(right.record.controller.clone(), Err(failure));
-                let last = Answer { record, is_last: true, ..right };
+                let last = Answer { record, stage: Stage::Last, ..right };
                 self.write(at, Arrival::LastLine(serde_json::to_vec(&last).unwrap()));
             }
             Fault::HangingCheck => {
                 let not_checked = Some("mirror: no answer in time".to_owned());
                 let checks = Some(ArmChecks { not_checked, ..ArmChecks::default() });
                 let record = ArmRecord { checks, ..right.record };
-                let last = Answer { record, is_last: true, ..right };
+                let last = Answer { record, stage: Stage::Last, ..right };
                 self.write(at, line(&last));
+            }
+            Fault::SlowChecks => {
+                self.write(at, line(&outcome));
+                self.write(state.now + limit + ANSWER_TIME, line(&right));
+            }
+            Fault::CrashInCheck => {
+                self.write(at, line(&outcome));
+                self.write(soon, Arrival::End);
+            }
+            Fault::CopyInCheck => {
+                self.write(at, line(&outcome));
+                self.write(soon, line(&copy));
+            }
+            Fault::OutcomeTwice => {
+                self.write(at, line(&outcome));
+                self.write(soon, line(&outcome));
+                self.write(soon, line(&right));
             }
         }
     }
@@ -239,6 +285,28 @@ impl Process {
         let first = self.pipe.first_entry().filter(|first| first.key().0 <= until.as_nanos())?;
         let at = Duration::from_nanos(u64::try_from(first.key().0).unwrap());
         Some((at, first.remove()))
+    }
+
+    /// Receives the next arrival, or none within `limit`.
+    fn receive(&mut self, state: &mut State, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        let until = state.now + limit;
+        let Some((at, arrival)) = self.take(until) else {
+            state.now = until;
+            return Ok(None);
+        };
+        state.now = at.max(state.now);
+        match arrival {
+            Arrival::LastLine(line) => {
+                state.crashes += 1;
+                Ok(Some(line))
+            }
+            Arrival::Line(line) => {
+                self.answered += 1;
+                Ok(Some(line))
+            }
+            Arrival::TooLong => Err(ExecError::LongLine { limit: 1 }),
+            Arrival::End => Err(self.ended(state)),
+        }
     }
 
     fn ended(&self, state: &mut State) -> ExecError {
@@ -266,26 +334,21 @@ impl Peer for Process {
         let question: Question = serde_json::from_slice(&line).unwrap();
         self.serve(&mut state, &question, limit);
         self.earlier.push_front(question);
-        match self.take(now + limit) {
-            None => {
-                state.now = now + limit;
-                Ok(None)
+        self.receive(&mut state, limit)
+    }
+
+    fn more_within(&mut self, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        let shared = Arc::clone(&self.state);
+        self.receive(&mut lock(&shared), limit)
+    }
+
+    fn finish(&mut self, _: &str) -> Result<(), ExecError> {
+        match self.take(Duration::MAX) {
+            Some((_, Arrival::Line(line) | Arrival::LastLine(line))) => {
+                let line = String::from_utf8_lossy(&line).into_owned();
+                Err(ExecError::OutOfTurn { answered: self.answered, line })
             }
-            Some((at, arrival)) => {
-                state.now = at;
-                match arrival {
-                    Arrival::LastLine(line) => {
-                        state.crashes += 1;
-                        Ok(Some(line))
-                    }
-                    Arrival::Line(line) => {
-                        self.answered += 1;
-                        Ok(Some(line))
-                    }
-                    Arrival::TooLong => Err(ExecError::LongLine { limit: 1 }),
-                    Arrival::End => Err(self.ended(&mut state)),
-                }
-            }
+            _ => Ok(()),
         }
     }
 

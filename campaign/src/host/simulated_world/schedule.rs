@@ -20,12 +20,12 @@ use crate::campaign_error::CampaignError;
 use crate::execution::Campaign;
 use crate::folder::{Folder, FolderError, JOURNAL};
 use crate::gate::{GateSet, Judge};
-use crate::journal::{self, Entry};
+use crate::journal::{self, Entry, FREE_BYTES};
 use crate::manifest::Manifest;
 use crate::plan::Plan;
 use crate::record::Record;
 use crate::sampling::Sampling;
-use crate::stop::End;
+use crate::stop::{End, StopFlag};
 use crate::validity::CheckPlan;
 use crate::verdict::{self, Verdict};
 use crate::workers::Samples;
@@ -39,6 +39,10 @@ const SEEDS: [u64; 2] = [1, 2];
 const MOST_RUNS: u32 = 3;
 /// Probabilities of a fault in the answer to a question (-).
 const RATES: [f64; 3] = [0.02, 0.1, 0.3];
+/// Probability of a signal at each question, in a run that has signals (-).
+const SIGNAL_RATE: f64 = 0.05;
+/// Room on a disk that may become full (bytes): some more than the journal needs.
+const MOST_FREE_BYTES: usize = 100_000;
 
 /// A broken property.
 #[derive(Debug)]
@@ -51,6 +55,8 @@ pub(super) enum Violation {
     TimeAsDefect { sample: u64, arm: usize },
     /// A part of the samples counts as all samples.
     PartialData { has: u64 },
+    /// The journal lacks records, and nobody is told.
+    Lost { kept: u64, records: u64 },
     /// Samples have no outcome, and the verdict is not ERROR.
     HiddenError { errors: u64, verdict: Option<Verdict> },
     /// A journal with a line of another campaign was resumed.
@@ -74,6 +80,7 @@ impl fmt::Display for Violation {
                 write!(f, "a check of sample {sample} in arm {arm} took too long, and counts as broken")
             }
             Self::PartialData { has } => write!(f, "{has} of {SAMPLES} records pass for all of them"),
+            Self::Lost { kept, records } => write!(f, "{kept} of {records} records are kept, and nobody is told"),
             Self::HiddenError { errors, verdict } => write!(f, "{errors} errors, and the verdict is {verdict:?}"),
             Self::OwnJournalRefused { message } => write!(f, "the program refuses its own journal: {message}"),
             Self::ForeignLine => f.write_str("a journal with a line of another campaign is resumed"),
@@ -143,11 +150,22 @@ impl Setup {
             let kill_after = random.random_bool(0.5).then(|| random.random_range(1..=SAMPLES));
             let retry_errors = random.random_bool(0.3);
             let retry_crashed = random.random_range(0..=2);
-            let plan = Run { kill_after, retry_errors, retry_crashed, rate };
+            let signal_rate = if random.random_bool(0.3) { SIGNAL_RATE } else { 0.0 };
+            let free_bytes = random.random_bool(0.3).then(|| random.random_range(0..MOST_FREE_BYTES));
+            let goes_on = random.random();
+            let plan = Run { kill_after, retry_errors, retry_crashed, rate, signal_rate, free_bytes, goes_on };
             faults += self.run_once(folder.path(), &mut random, plan, reader)?.0;
             faults += u64::from(self.damage(folder.path(), &mut random, reader)?);
         }
-        let last = Run { kill_after: None, retry_errors: true, retry_crashed: 0, rate: 0.0 };
+        let last = Run {
+            kill_after: None,
+            retry_errors: true,
+            retry_crashed: 0,
+            rate: 0.0,
+            signal_rate: 0.0,
+            free_bytes: None,
+            goes_on: false,
+        };
         let (_, end) = self.run_once(folder.path(), &mut random, last, reader)?;
         self.compare_with_undisturbed(folder.path(), end)?;
         Ok(faults)
@@ -165,6 +183,7 @@ impl Setup {
             now: Duration::ZERO,
             random: Stream::seed_from_u64(random.random()),
             rate: run.rate,
+            signal_rate: run.signal_rate,
             faults: 0,
             crashes: 0,
         };
@@ -172,12 +191,15 @@ impl Setup {
         let mut campaign = self.campaign.clone();
         campaign.remote = Some(machine.clone());
         campaign.retry_errors = run.retry_errors;
+        campaign.goes_on_without_folder = run.goes_on;
+        campaign.stop = StopFlag::default();
         let work = campaign.works[0].as_ref().clone();
         campaign.works = vec![Arc::new(crate::runner::Work { retry_crashed: run.retry_crashed, ..work })];
         let (mut summary, mut records, mut run_now) = (campaign.summary(), 0, 0);
         let mut judge = Judge::new(&campaign.works, &self.gates, campaign.inference);
         let locked = Folder::lock(path, &self.manifest, true).unwrap();
         let before = if path.join(JOURNAL).exists() { journal_lines(path) } else { Vec::new() };
+        FREE_BYTES.set(run.free_bytes);
         let ended = campaign.run(Some(&locked), |next| {
             summary.push(next.record);
             judge.push(next.record);
@@ -188,21 +210,31 @@ impl Setup {
                 _ => ControlFlow::Continue(()),
             }
         });
-        if let Err(CampaignError::Folder(error)) = &ended {
-            return Err(Violation::OwnJournalRefused { message: error.to_string() });
-        }
-        ended.unwrap();
+        FREE_BYTES.set(None);
+        let report = match ended {
+            Ok(report) => Some(report),
+            Err(CampaignError::Folder(error)) => {
+                return Err(Violation::OwnJournalRefused { message: error.to_string() });
+            }
+            Err(CampaignError::Write(_)) if run.free_bytes.is_some() => None,
+            Err(error) => panic!("{error}"),
+        };
         if let Some(violation) = machine.violation.lock().unwrap().take() {
             return Err(violation);
         }
         self.check_outcomes(path)?;
         check_retries(&before, &journal_lines(path))?;
+        let kept = journal_lines(path).len() as u64;
+        if report.as_ref().is_some_and(|report| report.lost.is_none()) && kept < records {
+            return Err(Violation::Lost { kept, records });
+        }
         let complete: Result<Vec<Record>, FolderError> = locked.folder.complete_records().unwrap().collect();
-        if complete.is_ok() != (journal_lines(path).len() as u64 == SAMPLES) {
+        if complete.is_ok() != (kept == SAMPLES) {
             return Err(Violation::PartialData { has: records });
         }
         let errors = summary.total().errors();
-        let verdict = (records == SAMPLES).then(|| verdict::judge(&summary, &judge, (&self.gates).into()).verdict());
+        let is_judged = report.is_some() && records == SAMPLES;
+        let verdict = is_judged.then(|| verdict::judge(&summary, &judge, (&self.gates).into()).verdict());
         let verdict = verdict.flatten();
         if errors > 0 && verdict.is_some_and(|verdict| verdict != Verdict::Error) {
             return Err(Violation::HiddenError { errors, verdict });
@@ -329,6 +361,12 @@ struct Run {
     retry_crashed: u32,
     /// Probability of a fault in the answer to a question (-).
     rate: f64,
+    /// Probability of a signal at each question (-).
+    signal_rate: f64,
+    /// Room for the journal; `None` without a limit.
+    free_bytes: Option<usize>,
+    /// Whether the campaign goes on without its folder when the disk is full.
+    goes_on: bool,
 }
 
 /// A runner that refuses every sample.

@@ -205,6 +205,17 @@ impl Child {
         answer
     }
 
+    /// Waits for one more answer to the last line that was sent. Returns `None` if there is none
+    /// within `limit`: the process is then killed when this value is dropped.
+    ///
+    /// # Errors
+    /// [`ExecError`] if the process ends, or does not keep to its limits.
+    pub fn more_within(&mut self, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        let answer = self.wait(limit, MemoryLook::Peak);
+        self.has_failed |= !matches!(answer, Ok(Some(_)));
+        answer
+    }
+
     /// Closes the standard input of the process, and checks that it has written only its answers,
     /// and that no signal ends it. A process that does not end by itself in a short time is killed,
     /// which is no error.

@@ -11,32 +11,45 @@ use super::error::{ExecError, how, last_lines};
 /// Largest number of messages that are kept. The text that a process writes may differ each time.
 const MOST_MESSAGES: usize = 5;
 
-static MESSAGES: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+type Messages = Mutex<BTreeSet<String>>;
 
-/// Returns the messages about processes that ended badly since the last call, each once, at most 5.
+static BAD_ENDS: Messages = Mutex::new(BTreeSet::new());
+static LEFT_OVER: Messages = Mutex::new(BTreeSet::new());
+
+/// Returns the messages about processes that ended badly since the last call, each once, at most 5,
+/// and those of [`take_left_over`].
 pub fn take_bad_ends() -> Vec<String> {
-    let messages = std::mem::take(&mut *MESSAGES.lock().unwrap_or_else(PoisonError::into_inner));
-    messages.into_iter().collect()
+    [take(&BAD_ENDS), take_left_over()].concat()
+}
+
+/// Returns the messages about processes that did not keep to the protocol after their last answer,
+/// since the last call, each once, at most 5.
+pub fn take_left_over() -> Vec<String> {
+    take(&LEFT_OVER)
 }
 
 /// Keeps that the process of a controller or a perception ended with this status as it unloaded its
 /// library, and the last lines of its standard error.
 pub(super) fn keep_bad_end(name: &str, status: ExitStatus, stderr: &str) {
-    keep(format!(
-        "the process of `{name}` ended with {} after its last sample, as it unloaded its library; no sample is \
-         concerned{}",
-        how(status),
-        last_lines(stderr)
-    ));
+    let (how, lines) = (how(status), last_lines(stderr));
+    let message = format!(
+        "the process of `{name}` ended with {how} after its last sample, as it unloaded its library; no sample is \
+         concerned{lines}"
+    );
+    keep(&BAD_ENDS, message);
 }
 
 /// Keeps that the process of a controller did not keep to the protocol after its last answer.
 pub fn keep_left_over(name: &str, error: &ExecError) {
-    keep(format!("after its last sample, the process of `{name}` failed; no sample is concerned: {error}"));
+    keep(&LEFT_OVER, format!("after its last sample, the process of `{name}` failed: {error}"));
 }
 
-fn keep(message: String) {
-    let mut messages = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
+fn take(messages: &Messages) -> Vec<String> {
+    std::mem::take(&mut *messages.lock().unwrap_or_else(PoisonError::into_inner)).into_iter().collect()
+}
+
+fn keep(messages: &Messages, message: String) {
+    let mut messages = messages.lock().unwrap_or_else(PoisonError::into_inner);
     if messages.len() < MOST_MESSAGES {
         messages.insert(message);
     }

@@ -70,7 +70,7 @@ pub(crate) use controller::START_TIMEOUT;
 pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
 pub(crate) use error::{ANSWERS_ALONE, is_other_text};
-pub use late::{keep_left_over, take_bad_ends};
+pub use late::{keep_left_over, take_bad_ends, take_left_over};
 pub use lines::NEW_SAMPLE;
 pub(crate) use lines::excerpt;
 pub use processes::{adopt_orphans, end_all};
