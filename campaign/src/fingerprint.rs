@@ -174,25 +174,31 @@ pub(crate) fn command_settings(program: &ProgramSettings) -> ExecSettings {
 }
 
 /// Returns the existing files that the command names, each as it is named and with its path: whole
-/// words, and what follows `=` in a word. The program is looked for in `PATH` if it is named
-/// without a folder.
+/// words, what follows `=` in a word, and what Python starts of a folder (`python3 DIR`) or a
+/// module (`python3 -m NAME`). The program is looked for in `PATH` if it is named without a folder.
 pub fn named_files(settings: &ExecSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
     let words = settings.words().unwrap_or_default();
     let mut files: Vec<(String, PathBuf)> = Vec::new();
     for (index, word) in words.iter().enumerate() {
-        let names = [Some(word.as_str()), word.split_once('=').map(|(_, value)| value)];
-        for name in names.into_iter().flatten().filter(|name| !name.is_empty()) {
-            let in_folder = || folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-            let path = if index == 0 && !name.contains('/') { in_search_path(name) } else { Some(in_folder()) };
+        let value = word.split_once('=').map(|(_, value)| value.to_owned());
+        let is_module = index > 0 && words[index - 1] == "-m";
+        let started = if is_module { word.replace('.', "/") } else { word.clone() };
+        let of_python = [is_module.then(|| format!("{started}.py")), Some(format!("{started}/{MAIN}"))];
+        for name in [Some(word.clone()), value].into_iter().chain(of_python).flatten().filter(|name| !name.is_empty()) {
+            let in_folder = || folder.map_or_else(|| PathBuf::from(&name), |folder| folder.join(&name));
+            let path = if index == 0 && !name.contains('/') { in_search_path(&name) } else { Some(in_folder()) };
             if let Some(path) = path.filter(|path| path.is_file())
-                && !files.iter().any(|(file, _)| file == name)
+                && !files.iter().any(|(file, _)| *file == name)
             {
-                files.push((name.to_owned(), path));
+                files.push((name, path));
             }
         }
     }
     files
 }
+
+/// The file that Python starts of a folder or a package.
+const MAIN: &str = "__main__.py";
 
 /// Returns the program of that name in the folders of `PATH`.
 fn in_search_path(name: &str) -> Option<PathBuf> {
@@ -214,9 +220,20 @@ mod tests {
         for name in ["a.py", "b.json"] {
             std::fs::write(folder.path().join(name), name).unwrap();
         }
-        let files = named_files(&settings("sh a.py --config=b.json c.txt a.py ."), Some(folder.path()));
-        let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names, ["sh", "a.py", "b.json"]);
+        let names = |command: &str| {
+            let files = named_files(&settings(command), Some(folder.path()));
+            files.into_iter().map(|(name, _)| name).collect::<Vec<String>>()
+        };
+        assert_eq!(names("sh a.py --config=b.json c.txt a.py ."), ["sh", "a.py", "b.json"]);
+        std::fs::create_dir_all(folder.path().join("package/within")).unwrap();
+        for name in ["package/__main__.py", "package/within/c.py"] {
+            std::fs::write(folder.path().join(name), name).unwrap();
+        }
+        // What Python starts: a folder, a module, a package, and a module of a package.
+        assert_eq!(names("sh package"), ["sh", "package/__main__.py"]);
+        assert_eq!(names("sh -u -m a"), ["sh", "a.py"]);
+        assert_eq!(names("sh -m package"), ["sh", "package/__main__.py"]);
+        assert_eq!(names("sh -m package.within.c"), ["sh", "package/within/c.py"]);
     }
 
     #[test]
