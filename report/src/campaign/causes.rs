@@ -9,6 +9,7 @@ use closecall_studies::cost::{cost, section as cost_section};
 use closecall_studies::failures::{CAUSES, Failures, campaign_failures, section, without_section, write_rows};
 use closecall_traffic::atomic::{WriteError, write_file};
 use closecall_traffic::input;
+use closecall_traffic::shown::shown;
 use maud::{Markup, html};
 
 /// The name of the report.
@@ -33,7 +34,7 @@ pub fn write_causes(
         let table = section(failures, saved.manifest().scenarios.len() > 1, command_for).into_string();
         // The heading keeps the name by which the list of contents refers to it.
         let heading = old.find("<h2").and_then(|begin| old[begin..].split_inclusive('>').next());
-        let table = table.replacen("<h2>", heading.unwrap_or("<h2>"), 1);
+        let table = shown(&table).replacen("<h2>", heading.unwrap_or("<h2>"), 1);
         write_file(&path, |file| file.write_all([before, &table, after].concat().as_bytes()))?;
         written.push(path);
     }

@@ -10,6 +10,7 @@ use closecall_campaign::folder::{FolderError, RECORDINGS, RECORDINGS_PAGE, REPOR
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::ScenarioFile;
 use closecall_traffic::input::read_text;
+use closecall_traffic::shown::shown;
 use closecall_traffic::words::counted;
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -132,7 +133,7 @@ pub fn explorer_page(saved: &SavedCampaign, place: &PagePlace, command_for: Comm
     };
     let names: Vec<&str> = files.iter().map(|file| file.config().name.as_str()).collect();
     let title = if names.len() > NAMED { counted(names.len(), "scenario") } else { names.join(", ") };
-    Ok(page(&title, saved, place, unfinished.as_ref(), &packed).into_string())
+    Ok(shown(&page(&title, saved, place, unfinished.as_ref(), &packed).0).into_owned())
 }
 
 fn written(saved: &SavedCampaign, source: std::io::Error) -> ReportError {

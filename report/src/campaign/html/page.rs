@@ -2,12 +2,13 @@
 
 use std::fmt::Display;
 
+use closecall_traffic::shown::shown;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The style sheet of all pages.
 pub(in crate::campaign) const STYLE: &str = include_str!("style.css");
 
-/// Returns a whole page.
+/// Returns a whole page, without control characters.
 pub fn document(title: &str, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -15,10 +16,10 @@ pub fn document(title: &str, body: &Markup) -> Markup {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) }
+                title { (shown(title)) }
                 style { (PreEscaped(STYLE)) }
             }
-            body { main { (PreEscaped(with_whole_percentages(&body.0))) } }
+            body { main { (PreEscaped(shown(&with_whole_percentages(&body.0)))) } }
         }
     }
 }
@@ -209,8 +210,8 @@ mod tests {
 
     #[test]
     fn text_cannot_become_markup() {
-        let page = document("<b> & \"c\"", &html! { p { "<script>" } }).into_string();
-        assert!(page.contains("<title>&lt;b&gt; &amp; &quot;c&quot;</title>"), "{page}");
-        assert!(page.contains("<p>&lt;script&gt;</p>"), "{page}");
+        let page = document("<b> & \"c\"\u{1}", &html! { p { "<script>\u{202e}" } }).into_string();
+        assert!(page.contains("<title>&lt;b&gt; &amp; &quot;c&quot;\\u0001</title>"), "{page}");
+        assert!(page.contains("<p>&lt;script&gt;\\u202e</p>"), "{page}");
     }
 }

@@ -13,7 +13,6 @@ use crate::campaign::recordings::card_beside;
 use closecall_scenarios::causal::LETTERS;
 use closecall_scenarios::outcome::Outcome;
 use closecall_traffic::atomic::{WriteError, write_file};
-use closecall_traffic::shown::shown;
 
 /// One recorded sample.
 #[derive(Clone, Debug)]
@@ -52,7 +51,7 @@ pub(in crate::campaign) fn write_index(
     command_for: CommandFor,
 ) -> Result<(), WriteError> {
     let page = page(entries, command_for).into_string();
-    write_file(path, |file| file.write_all(shown(&page).as_bytes()))
+    write_file(path, |file| file.write_all(page.as_bytes()))
 }
 
 fn page(entries: &[IndexEntry], command_for: CommandFor) -> Markup {

@@ -13,7 +13,6 @@ use crate::campaign::fidelity;
 use crate::campaign::findings::Findings;
 use crate::campaign::origins;
 use closecall_traffic::atomic::{WriteError, write_file};
-use closecall_traffic::shown::shown;
 
 /// Writes the page of a campaign.
 ///
@@ -21,7 +20,7 @@ use closecall_traffic::shown::shown;
 /// [`WriteError`] if a chart cannot be drawn or the file cannot be written. An existing file then
 /// stays as it is.
 pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> Result<(), WriteError> {
-    write_file(path, |file| file.write_all(shown(&campaign(findings)?.into_string()).as_bytes()))
+    write_file(path, |file| file.write_all(campaign(findings)?.into_string().as_bytes()))
 }
 
 /// Returns the page of a campaign.
