@@ -345,6 +345,19 @@ impl Folder {
         self.records()?.try_for_each(|record| record.map(drop))
     }
 
+    /// Checks the journal as [`Self::check_journal`], and returns true if it has the record of a
+    /// sample.
+    ///
+    /// # Errors
+    /// [`FolderError`] as an item of [`Self::records`].
+    pub fn has_record(&self, scenario: &str, sample: u64) -> Result<bool, FolderError> {
+        let is_it = |record: Record| record.scenario == scenario && record.sample == sample;
+        match self.has(JOURNAL)? {
+            true => self.records()?.try_fold(false, |is_there, record| Ok(is_it(record?) || is_there)),
+            false => Ok(false),
+        }
+    }
+
     /// Returns true if this program wrote the manifest for this user: see [`Self::remember`].
     pub(crate) fn is_own(&self) -> Result<bool, FolderError> {
         Ok(trust::is_own(&self.manifest_with_hash()?.1))

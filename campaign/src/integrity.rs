@@ -6,6 +6,7 @@
 //! | `journal.jsonl`, `wall-times.jsonl`, `lock` | no file, such as a named pipe or a link | its removal, then `--resume` |
 //! | `journal.jsonl` | a damaged line, a line that is there twice, missing samples | `--resume` |
 //! | `journal.jsonl` | a record of another sample, another order | a new campaign |
+//! | `controller-changes.json` | unreadable | a copy of the folder |
 //! | files made from the journal | missing | `--resume` |
 //!
 //! Fast samples, in [`FAST_SAMPLES`](crate::folder::FAST_SAMPLES), have no files that are made from
@@ -24,7 +25,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::action::{Action, CommandFor, Resume};
-use crate::folder::{AHEAD, DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST, WALL_TIMES};
+use crate::controller_watch::kept_changes;
+use crate::folder::{AHEAD, CONTROLLER_CHANGES, DERIVED_FILES, Folder, FolderError, JOURNAL, MANIFEST, WALL_TIMES};
 use crate::journal::{self, Entry};
 use crate::lock::LOCK;
 use crate::manifest::Manifest;
@@ -81,6 +83,9 @@ impl Integrity {
             let repair = integrity.resumption.clone();
             integrity.add_error(JOURNAL, &error, &repair);
             return integrity;
+        }
+        if let Err(error) = kept_changes(folder) {
+            integrity.add_error(CONTROLLER_CHANGES, &error, "put a copy of the folder in its place");
         }
         let is_paired = manifest.arms.len() > 1;
         let derived: &[&str] = if folder.campaign_of_fast_samples().is_some() { &[] } else { &DERIVED_FILES };

@@ -1,7 +1,6 @@
 //! The inference backend of the rear camera's network. It is loaded only by commands that may run
 //! the network.
 
-use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Duration;
 
@@ -37,15 +36,13 @@ pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
 
 /// Refuses a library that does not exist, or is a folder.
 fn must_be_readable(library: &Path) -> Result<(), ClassifierError> {
-    let checked = input::open(library).and_then(|file| match file.metadata()?.is_dir() {
-        true => Err(ErrorKind::IsADirectory.into()),
-        false => Ok(()),
-    });
-    checked.map_err(|error| ClassifierError::Read { path: library.display().to_string(), reason: error.to_string() })
+    let opened = input::open(library).map(drop);
+    opened.map_err(|error| ClassifierError::Read { path: library.display().to_string(), reason: error.to_string() })
 }
 
-/// Longest time in which ONNX Runtime is loaded. An assumption: ten times the time on a slow disk.
-const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
+/// Longest time in which ONNX Runtime is loaded, as for a controller that is a library. An
+/// assumption: 30 times the time on a fast disk.
+const LOAD_TIMEOUT: Duration = Duration::from_secs(10);
 /// Memory of the process that tries it (MiB): several times the memory of the network and of ONNX
 /// Runtime.
 const LOAD_MEMORY_MIB: u64 = 8_192;
@@ -61,7 +58,9 @@ fn try_to_load(library: &Path, backend: &Backend) -> Result<(), ClassifierError>
     let answer = Child::start(&settings, None).and_then(|mut child| child.request_within(Vec::new(), LOAD_TIMEOUT));
     match answer {
         Ok(Some(_)) => Ok(()),
-        Ok(None) => Err(fail(format!("it is not loaded within {} s", LOAD_TIMEOUT.as_secs()))),
+        Ok(None) => {
+            Err(fail(format!("it is not loaded within {} s: its constructor may wait or loop", LOAD_TIMEOUT.as_secs())))
+        }
         // The library cannot be loaded: this process meets the same error, and reports it.
         Err(ExecError::Ended { status, .. }) if status.code() == Some(ExitCode::SampleError as i32) => Ok(()),
         Err(error) => Err(fail(error.to_string())),

@@ -32,7 +32,7 @@ use super::help::{examples, heading};
 use super::new::scenario_file;
 use super::output::{during, outln, print_error, print_text, print_written, textln, warn};
 use super::protect::{files_of_campaign, must_be_folder, must_be_writable, protect};
-use super::saved::SavedArgs;
+use super::saved::{SavedArgs, check_record};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall explain`.
@@ -66,7 +66,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
     match args.sample {
         // All failures are the failures of all samples.
         None => saved.folder().complete_records()?.try_for_each(|record| record.map(drop))?,
-        Some(_) => saved.folder().check_journal()?,
+        Some(sample) => check_record(saved.folder(), &saved.sample(args.scenario.as_deref(), sample)?.0.name, sample)?,
     }
     let explained = during(format!("explaining {}", args.dir.display()), || {
         explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)
@@ -158,7 +158,10 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
             (search.case().clone(), Some(search))
         }
     };
-    saved.folder().check_journal()?;
+    match (*sample, &search) {
+        (Some(sample), None) => check_record(saved.folder(), &case.file.config().name, sample)?,
+        _ => saved.folder().check_journal()?,
+    }
     let of_nearest = search.as_ref().map(|_| PathBuf::from(format!("{}-nearest.toml", case.file.config().name)));
     let paths = output_files(&case, args.output.as_deref().or(of_nearest.as_deref()))?;
     protect(&files_of_campaign(&args.dir), &paths.each_ref().map(|path| ("--out", Some(path.as_path()))))?;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use closecall_campaign::arguments::{MemoryMib, TimeoutMs};
+use closecall_campaign::folder::Folder;
 use closecall_campaign::rare::RareManifest;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_scenarios::outcome::Outcome;
@@ -55,6 +56,16 @@ pub(super) fn difference_from_journal<'a>(
     outcomes: impl IntoIterator<Item = &'a Outcome>,
 ) -> Result<Option<String>, CliError> {
     Ok(saved.folder().differences(outcomes)?.into_iter().next())
+}
+
+/// Checks the journal of a folder, and says so if it has no result of a sample that runs again.
+pub(super) fn check_record(folder: &Folder, scenario: &str, sample: u64) -> Result<(), CliError> {
+    if !folder.has_record(scenario, sample)? {
+        print_error(format_args!(
+            "not compared: the campaign's journal has no result of sample {sample}; its campaign may not have come to its end\n"
+        ));
+    }
+    Ok(())
 }
 
 /// The limits of the processes of controllers.

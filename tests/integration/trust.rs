@@ -219,6 +219,12 @@ fn the_repair_of_a_copied_folder_names_the_copy_and_the_failures_of_a_part_are_n
     let output = closecall(["explain", copy.to_str().unwrap()]);
     assert_eq!(code(&output), 3, "{}", stderr(&output));
     assert!(message(&output).contains("it has 6 of the 8 samples"), "{}", stderr(&output));
+    let figure = folder.path().join("figure.svg");
+    for (sample, is_compared) in [("5", true), ("6", false)] {
+        let output = closecall(["plot", copy.to_str().unwrap(), sample, "-o", figure.to_str().unwrap()]);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        assert_eq!(!message(&output).contains("not compared: the campaign's journal has no result of"), is_compared);
+    }
 }
 
 #[test]
@@ -380,6 +386,14 @@ fn a_mirrored_run_that_takes_too_long_is_not_checked_and_no_defect_of_the_simula
     fs::write(out.join("journal.jsonl"), kept).unwrap();
     let text = stdout(&run(None, &["--resume", "--retry-errors"]), 0);
     assert!(text.contains("checked: 2 runs") && !text.contains("not checked: 2"), "{text}");
+    // Each call is in time, and the checks as a whole are not: the sample keeps its outcome.
+    fs::remove_dir_all(&out).unwrap();
+    let text = stdout(&run(Some("slow-mirror"), &["--sample-timeout-s", "3"]), 0);
+    assert!(text.contains("not checked: 2 runs"), "{text}");
+    for record in &records(&out)[..2] {
+        let not_checked = record.arms[0].checks.as_ref().unwrap().not_checked.as_ref().unwrap();
+        assert!(not_checked.contains("no outcome within 3 s"), "{not_checked}");
+    }
 }
 
 #[test]
