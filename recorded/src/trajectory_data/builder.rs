@@ -199,12 +199,18 @@ impl TrackBuilder {
             self.continuity.edge_crossings += u64::from(cut.start);
         }
         self.continuity.edge_crossings += u64::from(cut.end);
-        if first.number >= PIECE_STRIDE && piece > 0 {
+        // A vehicle has a further number on each further road, which the pieces on the roads before may have taken.
+        let offset = first.number.saturating_sub(first.vehicle_id);
+        let roads_before = if offset.is_multiple_of(PIECE_STRIDE) { offset / PIECE_STRIDE } else { 0 };
+        let own_number = first.number - roads_before * PIECE_STRIDE;
+        if own_number >= PIECE_STRIDE && piece > 0 {
             // The number already belongs to a piece of a split track, so no number is left for the
             // pieces of this vehicle.
             return Err(ReadError::new(first.line, TrajectoryFileProblem::SplitPiece { track: first.number }));
         }
-        let track_id = first.number + piece * PIECE_STRIDE;
+        let on_road = |road: u64| self.pieces.get(&(own_number + road * PIECE_STRIDE));
+        let splits_before: u64 = (0..roads_before).filter_map(on_road).map(|pieces| pieces.count - 1).sum();
+        let track_id = first.number + (splits_before + piece) * PIECE_STRIDE;
         if piece > 0 && self.pieces.contains_key(&track_id) {
             return Err(ReadError::new(first.line, TrajectoryFileProblem::SplitPiece { track: track_id }));
         }

@@ -114,6 +114,18 @@ impl CollectedRow {
         let (vehicle, time, speed_mps) = (u64::from(self.vehicle), self.time, self.speed_mps);
         PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock }
     }
+
+    /// Returns `true` if the file states the same in both rows. `changes_lane` depends on the row before.
+    fn repeats(&self, other: &Self) -> bool {
+        let stated = |row: &Self| {
+            let mut row = Self { line: 0, ..*row };
+            if let Position::Plane { changes_lane, .. } = &mut row.position {
+                *changes_lane = false;
+            }
+            row
+        };
+        stated(self) == stated(other)
+    }
 }
 
 /// The facts about a file that its reader has collected after the last row.
@@ -411,7 +423,7 @@ fn take_doubled(rows: &[CollectedRow], order: &mut Vec<usize>, numbers: &[u64]) 
             return true;
         };
         let CollectedRow { position, line: first_line, .. } = rows[of];
-        if rows[of] == (CollectedRow { line: first_line, ..*row }) {
+        if row.repeats(&rows[of]) {
             doubled.repeated.push(Repetition { index, of });
             return false;
         }

@@ -11,7 +11,7 @@
 //! documentation of network files; PTV Vissim, help on lanes). Networks of left-hand traffic count from
 //! the left. No file states which one it is.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::{Time, maths};
 
@@ -26,6 +26,9 @@ const BESIDE_M: f64 = 30.0;
 const ENOUGH: usize = 20_000;
 /// Number of later vehicles of the same instant with which a vehicle is compared.
 const COMPARED: usize = 8;
+/// Largest number of rows that are held. Beyond it, the earliest instant is left out: rows in the order of time need
+/// one instant, and rows in the order of vehicles need all.
+const MOST_HELD: usize = 1 << 18;
 
 /// Least number of comparisons, and of pairs of vehicles, that contradict the count of the lanes.
 const LEAST_COMPARISONS: usize = 20;
@@ -48,9 +51,9 @@ pub(super) struct Beside {
 /// What vehicles beside each other show of the lanes.
 #[derive(Default)]
 pub(super) struct LaneSides {
-    /// The vehicles of the current time.
-    beside: Vec<Beside>,
-    current: Option<Time>,
+    /// The vehicles of each time.
+    beside: BTreeMap<Time, Vec<Beside>>,
+    held: usize,
     /// Lateral distances of vehicles whose lanes are on the side that their indices say, and on the
     /// other one (m).
     agreeing_m: Vec<f64>,
@@ -59,16 +62,17 @@ pub(super) struct LaneSides {
 }
 
 impl LaneSides {
-    /// Compares a vehicle with those in the neighbouring lanes at the same time. Rows are in the order
-    /// of time.
+    /// Compares a vehicle with those in the neighbouring lanes at the same time.
     pub(super) fn add(&mut self, time: Time, vehicle: Beside) {
         if self.agreeing_m.len() + self.contradicting_m.len() >= ENOUGH {
+            self.beside.clear();
             return;
         }
-        if self.current.replace(time) != Some(time) {
-            self.beside.clear();
+        if self.held >= MOST_HELD {
+            self.held -= self.beside.pop_first().map_or(0, |(_, earliest)| earliest.len());
         }
-        for other in self.beside.iter().rev().take(COMPARED) {
+        let beside = self.beside.entry(time).or_default();
+        for other in beside.iter().rev().take(COMPARED) {
             let (dx, dy) = (vehicle.point.0 - other.point.0, vehicle.point.1 - other.point.1);
             let (cos, sin) = (maths::cos(vehicle.heading_rad), maths::sin(vehicle.heading_rad));
             let (along_m, left_m) = (dx * cos + dy * sin, dy * cos - dx * sin);
@@ -85,7 +89,8 @@ impl LaneSides {
                 self.contradicting_pairs.insert(pair);
             }
         }
-        self.beside.push(vehicle);
+        beside.push(vehicle);
+        self.held += 1;
     }
 
     /// Returns the lane width (m), if vehicles drive beside each other.

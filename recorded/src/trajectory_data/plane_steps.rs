@@ -54,8 +54,8 @@ impl PlaneSteps {
             return;
         }
         self.numbers.add(row.vehicle, Time::ZERO, row.time, row.point);
-        // A second row of a frame is refused by that reason later.
-        if self.latest.get(&row.vehicle).is_some_and(|before| before.time == row.time) {
+        // A second row of a frame, and rows in backward order, are refused by that reason later.
+        if self.latest.get(&row.vehicle).is_some_and(|before| before.time >= row.time) {
             return;
         }
         let Some(before) = self.latest.insert(row.vehicle, row) else { return };
@@ -119,6 +119,17 @@ mod tests {
         // Slow, and back by 0.4 m in every other step.
         let jam = along_x(0.0, 1.0, |step| 0.1 * f64::from(step) + if step % 2 == 0 { 0.5 } else { 0.0 });
         assert!(jam.movements >= LEAST_STEPS - 10 && jam.against == 0, "{jam:?}");
+    }
+
+    #[test]
+    fn rows_in_backward_order_say_nothing_of_the_headings() {
+        let mut steps = PlaneSteps::default();
+        for step in (0..1000).rev() {
+            let (time, point) = (Time::from_s(0.1 * f64::from(step)), (2.0 * f64::from(step), 0.0));
+            let clock = Clock::Continuous;
+            steps.add(PlaneMoment { vehicle: 1, time, point, heading_rad: 0.0, speed_mps: 20.0, clock });
+        }
+        steps.check(Layout::Osi).unwrap();
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Files of other programs: SUMO, Vissim, I-24 MOTION, Parquet, inD; what they mean, and what is
 //! refused.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use std::sync::Arc;
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::{LaneReliability, detect};
 use closecall_recorded::trajectory_data::{
-    AxisOptions, BadRows, Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileError,
+    AxisOptions, BadRows, Layout, LayoutChoice, PIECE_STRIDE, ReadOptions, TrajectoryData, TrajectoryFileError,
     TrajectoryFileProblem, open_from, read, read_from, read_with,
 };
 use closecall_traffic::{Side, Time, VehicleClass, maths};
@@ -591,7 +592,15 @@ fn a_name_of_several_vehicles_at_one_time_is_refused_by_that_reason() {
         None => line.to_owned() + "\n",
     };
     let vissim: String = vissim_by_link().lines().map(other_link).collect();
-    for text in [sumo, vissim] {
+    let table = sumo_table(";", true);
+    let (header, rows) = table.split_once('\n').unwrap();
+    let mut by_vehicle: Vec<Vec<&str>> = rows.lines().map(|row| row.split(';').collect()).collect();
+    by_vehicle.sort_by_key(|fields| fields[1]);
+    let by_vehicle = by_vehicle.into_iter().fold(format!("{header}\n"), |text, mut fields| {
+        fields[3] = fields[3].trim_start_matches('-');
+        text + &fields.join(";") + "\n"
+    });
+    for text in [sumo, vissim, by_vehicle] {
         let problem = read_text(text.as_bytes()).unwrap_err().problem;
         assert!(matches!(problem, TrajectoryFileProblem::SharedNumber { vehicle: 1, frame: 0, .. }), "{problem}");
     }
@@ -645,7 +654,15 @@ fn mirrored_files_of_sumo_and_vissim_are_refused_and_the_named_options_mend_them
     });
     let axes = AxisOptions { mirror_d: true, lanes_from_right: true, ..AxisOptions::default() };
     let options = ReadOptions { axes, ..ReadOptions::default() };
-    for text in [sumo, vissim] {
+    let table = sumo_table(";", true);
+    let (header, rows) = table.split_once('\n').unwrap();
+    let mut by_vehicle: Vec<Vec<&str>> = rows.lines().map(|row| row.split(';').collect()).collect();
+    by_vehicle.sort_by_key(|fields| fields[1]);
+    let by_vehicle = by_vehicle.into_iter().fold(format!("{header}\n"), |text, mut fields| {
+        fields[3] = fields[3].trim_start_matches('-');
+        text + &fields.join(";") + "\n"
+    });
+    for text in [sumo, vissim, by_vehicle] {
         let problem = read_text(text.as_bytes()).unwrap_err().problem;
         assert!(matches!(problem, TrajectoryFileProblem::IndexAgainstPosition { .. }), "{problem}");
         let tracks = open_from(text.as_bytes(), Path::new("a"), options, usize::MAX);
@@ -691,6 +708,17 @@ fn a_track_of_vissim_ends_where_its_link_ends() {
     assert!(data.notes.iter().any(|note| note.contains("each of 2 links")), "{:?}", data.notes);
     let far_m = data.trajectories[0].points[0].d_m - data.trajectories[7].points[0].d_m;
     assert!(far_m.abs() > 900.0, "the roads are apart: {far_m}");
+    // A gap on each link: four tracks of each vehicle, with numbers of their own.
+    let is_in_gap = |line: &str| {
+        let fields: Vec<f64> = line.split(';').filter_map(|field| field.parse().ok()).collect();
+        matches!(fields[..], [_, _, _, _, along_m, _] if (60.0..110.0).contains(&along_m))
+    };
+    let kept = text.lines().filter(|line| !is_in_gap(line)).collect::<Vec<_>>().join("\n");
+    let data = read_text((kept + "\n").as_bytes()).unwrap();
+    let numbers: Vec<u64> = data.trajectories.iter().map(|track| track.track_id).collect();
+    let of_each = |piece: u64| (1..=4).map(move |vehicle| vehicle + piece * PIECE_STRIDE);
+    assert_eq!(BTreeSet::from_iter(numbers), (0..4).flat_map(of_each).collect());
+    assert_eq!(data.trajectories.len(), 16);
 }
 
 #[test]

@@ -29,6 +29,8 @@ fn what_stands_in_a_file_twice_with_the_same_values_counts_once() {
     let sumo = sumo_xml(false);
     let (begin, end) = ("<timestep time=\"3.00\">", "<timestep time=\"3.10\">");
     let step = &sumo[sumo.find(begin).unwrap()..sumo.find(end).unwrap()];
+    let (change, after_change) = ("<timestep time=\"6.00\">", "<timestep time=\"6.10\">");
+    let change = &sumo[sumo.find(change).unwrap()..sumo.find(after_change).unwrap()];
     let documents = i24(true);
     let first = documents.trim_start_matches('[').split(",\n").next().unwrap();
     let cases = [
@@ -38,6 +40,8 @@ fn what_stands_in_a_file_twice_with_the_same_values_counts_once() {
         ("NGSIM", ngsim.clone(), with_line_again(&ngsim, 7, true), 1),
         ("CommonRoad", trajectory(&states), trajectory(&twice), 1),
         ("SUMO", sumo.clone(), sumo.replacen(end, &format!("{step}{end}"), 1), 4),
+        // In the first row of a new lane.
+        ("SUMO, lane change", sumo.clone(), sumo.replacen(after_change, &format!("{change}{after_change}"), 1), 4),
         ("I-24 MOTION", documents.clone(), documents.replacen('[', &format!("[{first},\n"), 1), 250),
     ];
     for (case, text, again, rows) in cases {
