@@ -8,6 +8,7 @@ pub mod filters;
 pub mod fit;
 pub mod following;
 pub mod lane_change;
+mod mcap_records;
 pub mod openlabel;
 pub mod osi;
 pub mod robustness;

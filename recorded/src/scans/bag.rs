@@ -2,19 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::BufReader;
 use std::path::Path;
 
 use closecall_traffic::input;
 use mcap::McapError;
 use mcap::parse_record;
 use mcap::records::Record;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::cdr::{odometry, point_cloud};
 use super::error::{Origin, ScanFileError, ScanFileProblem};
 use super::options::{ScanOptions, TakenScan};
 use super::poses::Poses;
+use crate::mcap_records::{McapRecords, RawRecord};
 
 const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 const ODOMETRY: &str = "nav_msgs/msg/Odometry";
@@ -43,8 +43,7 @@ struct Message {
 /// The messages of a file, one after the other.
 struct Messages {
     origin: Origin,
-    file: BufReader<File>,
-    reader: LinearReader,
+    records: McapRecords<BufReader<File>>,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
     counts: BTreeMap<u16, usize>,
@@ -55,15 +54,15 @@ impl Messages {
         let origin = Origin::file(path);
         let file = BufReader::new(input::open(path).map_err(|error| origin.error(error))?);
         let (schemas, channels, counts) = Default::default();
-        let reader =
-            LinearReader::new_with_options(LinearReaderOptions::default().with_record_length_limit(MAX_RECORD));
-        Ok(Self { origin, file, reader, schemas, channels, counts })
+        let records = McapRecords::new(file, MAX_RECORD);
+        Ok(Self { origin, records, schemas, channels, counts })
     }
 
     /// Returns the next point cloud or odometry.
     fn next(&mut self) -> Result<Option<Message>, ScanFileError> {
         let of_mcap = |origin: &Origin, error: McapError| {
             let text = match error {
+                McapError::Io(error) => return origin.error(error),
                 McapError::UnsupportedCompression(kind) => {
                     format!("a chunk has the compression `{kind}`, but `lz4`, `zstd` and none are read")
                 }
@@ -72,36 +71,29 @@ impl Messages {
             };
             origin.error(ScanFileProblem::Mcap(text))
         };
-        while let Some(event) = self.reader.next_event() {
-            match event.map_err(|error| of_mcap(&self.origin, error))? {
-                LinearReadEvent::ReadRequest(wanted) => {
-                    let buffer = self.reader.insert(wanted);
-                    let read = self.file.read(buffer).map_err(|error| self.origin.error(error))?;
-                    self.reader.notify_read(read);
+        while let Some(RawRecord { opcode, data }) =
+            self.records.next().map_err(|error| of_mcap(&self.origin, error))?
+        {
+            match parse_record(opcode, &data).map_err(|error| of_mcap(&self.origin, error))? {
+                Record::Schema { header, .. } => {
+                    self.schemas.insert(header.id, header.name);
                 }
-                LinearReadEvent::Record { data, opcode } => {
-                    match parse_record(opcode, data).map_err(|error| of_mcap(&self.origin, error))? {
-                        Record::Schema { header, .. } => {
-                            self.schemas.insert(header.id, header.name);
-                        }
-                        Record::Channel(channel) => {
-                            let message = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                            let (topic, encoding) = (channel.topic, channel.message_encoding);
-                            self.channels.insert(channel.id, Channel { topic, message, encoding });
-                        }
-                        Record::Message { header, data } => {
-                            let Some(channel) = self.channels.get(&header.channel_id) else { continue };
-                            if ![POINT_CLOUD, ODOMETRY].contains(&&*channel.message) {
-                                continue;
-                            }
-                            let count = self.counts.entry(header.channel_id).or_default();
-                            let number = *count;
-                            *count += 1;
-                            return Ok(Some(Message { channel: channel.clone(), number, data: data.into_owned() }));
-                        }
-                        _ => {}
+                Record::Channel(channel) => {
+                    let message = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                    let (topic, encoding) = (channel.topic, channel.message_encoding);
+                    self.channels.insert(channel.id, Channel { topic, message, encoding });
+                }
+                Record::Message { header, data } => {
+                    let Some(channel) = self.channels.get(&header.channel_id) else { continue };
+                    if ![POINT_CLOUD, ODOMETRY].contains(&&*channel.message) {
+                        continue;
                     }
+                    let count = self.counts.entry(header.channel_id).or_default();
+                    let number = *count;
+                    *count += 1;
+                    return Ok(Some(Message { channel: channel.clone(), number, data: data.into_owned() }));
                 }
+                _ => {}
             }
         }
         Ok(None)

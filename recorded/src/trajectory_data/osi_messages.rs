@@ -6,11 +6,11 @@ use std::io::{BufRead, Read};
 use mcap::McapError;
 use mcap::parse_record;
 use mcap::records::Record;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::error::TrajectoryFileProblem;
 use super::rows::io_problem;
 use super::source::ReadError;
+use crate::mcap_records::{McapRecords, RawRecord};
 
 pub(super) const FORMAT: &str = "file of OSI messages";
 
@@ -35,12 +35,8 @@ pub(super) enum Messages<R> {
 
 impl<R: BufRead> Messages<R> {
     pub(super) fn of_mcap(input: R) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_record_length_limit(MAX_MESSAGE_BYTES)
-            .with_validate_chunk_crcs(true)
-            .with_validate_data_section_crc(true);
-        let (reader, schemas, topics) = (LinearReader::new_with_options(options), BTreeMap::new(), BTreeMap::new());
-        Self::Mcap(Box::new(McapMessages { input, reader, schemas, topics, read: None, others: Vec::new() }))
+        let (records, schemas, topics) = (McapRecords::new(input, MAX_MESSAGE_BYTES), BTreeMap::new(), BTreeMap::new());
+        Self::Mcap(Box::new(McapMessages { records, schemas, topics, read: None, others: Vec::new() }))
     }
 
     /// Returns the next message; its number is `number`.
@@ -85,8 +81,7 @@ fn next_of_trace(input: &mut impl BufRead, number: u64) -> Result<Option<Vec<u8>
 
 /// The messages of one channel of an MCAP file.
 pub(super) struct McapMessages<R> {
-    input: R,
-    reader: LinearReader,
+    records: McapRecords<R>,
     /// Name and encoding of each schema.
     schemas: BTreeMap<u16, String>,
     /// Topic of each channel with `GroundTruth`.
@@ -99,45 +94,38 @@ pub(super) struct McapMessages<R> {
 
 impl<R: BufRead> McapMessages<R> {
     fn next(&mut self) -> Result<Option<Vec<u8>>, ReadError> {
-        while let Some(event) = self.reader.next_event() {
-            match event.map_err(of_mcap)? {
-                LinearReadEvent::ReadRequest(wanted) => {
-                    let buffer = self.reader.insert(wanted);
-                    let read = self.input.read(buffer).map_err(|error| ReadError::of_file(io_problem(error)))?;
-                    self.reader.notify_read(read);
+        while let Some(RawRecord { opcode, data }) = self.records.next().map_err(of_mcap)? {
+            match parse_record(opcode, &data).map_err(of_mcap)? {
+                Record::Schema { header, .. } => {
+                    self.schemas.insert(header.id, header.name);
                 }
-                LinearReadEvent::Record { data, opcode } => match parse_record(opcode, data).map_err(of_mcap)? {
-                    Record::Schema { header, .. } => {
-                        self.schemas.insert(header.id, header.name);
+                Record::Channel(channel) => {
+                    let message = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                    if message != MESSAGE {
+                        self.others.push(message);
+                        continue;
                     }
-                    Record::Channel(channel) => {
-                        let message = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                        if message != MESSAGE {
-                            self.others.push(message);
-                            continue;
-                        }
-                        if channel.message_encoding != PROTOBUF {
-                            return Err(refused(format!(
-                                "the topic {} has the encoding `{}`, but `{PROTOBUF}` is needed",
-                                channel.topic, channel.message_encoding
-                            )));
-                        }
-                        self.topics.insert(channel.id, channel.topic);
+                    if channel.message_encoding != PROTOBUF {
+                        return Err(refused(format!(
+                            "the topic {} has the encoding `{}`, but `{PROTOBUF}` is needed",
+                            channel.topic, channel.message_encoding
+                        )));
                     }
-                    Record::Message { header, data } => {
-                        if !self.topics.contains_key(&header.channel_id) {
-                            continue;
-                        }
-                        let read = *self.read.get_or_insert(header.channel_id);
-                        if read != header.channel_id {
-                            let topics: Vec<&str> = self.topics.values().map(String::as_str).collect();
-                            let topics = topics.join("` and `");
-                            return Err(refused(format!("the topics `{topics}` both hold {MESSAGE}; one is needed")));
-                        }
-                        return Ok(Some(data.into_owned()));
+                    self.topics.insert(channel.id, channel.topic);
+                }
+                Record::Message { header, data } => {
+                    if !self.topics.contains_key(&header.channel_id) {
+                        continue;
                     }
-                    _ => {}
-                },
+                    let read = *self.read.get_or_insert(header.channel_id);
+                    if read != header.channel_id {
+                        let topics: Vec<&str> = self.topics.values().map(String::as_str).collect();
+                        let topics = topics.join("` and `");
+                        return Err(refused(format!("the topics `{topics}` both hold {MESSAGE}; one is needed")));
+                    }
+                    return Ok(Some(data.into_owned()));
+                }
+                _ => {}
             }
         }
         if self.read.is_none() {
@@ -151,6 +139,7 @@ impl<R: BufRead> McapMessages<R> {
 
 fn of_mcap(error: McapError) -> ReadError {
     refused(match error {
+        McapError::Io(error) => return ReadError::of_file(io_problem(error)),
         McapError::UnsupportedCompression(kind) => {
             format!("a chunk has the compression `{kind}`, but `lz4`, `zstd` and none are read")
         }
