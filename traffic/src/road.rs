@@ -110,7 +110,7 @@ pub struct RoadConfig {
     /// Curvature of the left edge (1/m), positive if the road bends to the left.
     #[serde(default = "default_curvature")]
     pub curvature_per_m: Num,
-    /// The points between which the curvature changes linearly, 2 to 32 instead of `curvature-per-m`:
+    /// The points between which the curvature changes linearly, 2 to 64 instead of `curvature-per-m`:
     /// lines, arcs and clothoids. The positions increase by 1 m or more; a position that occurs twice
     /// is a jump. Default: none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -186,7 +186,7 @@ impl Check for AlignmentPointConfig {
 
 impl Alignment {
     /// Largest number of points.
-    pub const MAX_POINTS: usize = 32;
+    pub const MAX_POINTS: usize = 64;
     /// Positions of points (m).
     pub const POSITION_M: Range = Range::closed(-10_000.0, 100_000.0);
     /// Curvatures (1/m): a radius of 250 m, the smallest one of the roads of ASAM's ALKS scenarios.
@@ -206,7 +206,7 @@ impl Alignment {
     /// in order: they increase by 1 m or more, or a position occurs twice.
     pub fn new(points: &[AlignmentPoint]) -> Result<Self, ConfigError> {
         if !(2..=Self::MAX_POINTS).contains(&points.len()) {
-            let problem = Problem::WrongLength { value: points.len() as u64, allowed: "2 to 32" };
+            let problem = Problem::WrongLength { value: points.len() as u64, allowed: "2 to 64" };
             return Err(ConfigError::new("alignment", problem));
         }
         for (index, point) in points.iter().enumerate() {

@@ -166,9 +166,9 @@ fn points_that_are_no_alignment_are_refused_by_their_key() {
         Alignment::new(&points).map(|_| ()).unwrap_err().to_string()
     };
     for (points, words) in [
-        (vec![], "`alignment` has 0 entries, but 2 to 32 are allowed"),
-        (vec![[0.0, 0.0]], "`alignment` has 1 entry, but 2 to 32 are allowed"),
-        (vec![[0.0, 0.0]; 33], "`alignment` has 33 entries,"),
+        (vec![], "`alignment` has 0 entries, but 2 to 64 are allowed"),
+        (vec![[0.0, 0.0]], "`alignment` has 1 entry, but 2 to 64 are allowed"),
+        (vec![[0.0, 0.0]; 65], "`alignment` has 65 entries,"),
         (
             vec![[0.0, 0.0], [100.0, 0.0041]],
             "`alignment[1].curvature-per-m` is 0.0041, but a number from -0.004 to 0.004",
