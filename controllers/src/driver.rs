@@ -28,7 +28,7 @@ pub use interface::{
 };
 pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
 pub(crate) use merging::MergingDriver;
-pub use merging::{ENTRY_STOP_MPS2, entry_stop_distance_m};
+pub use merging::{ENTRY_STOP_MPS2, entry_change_duration_s, entry_stop_distance_m};
 pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
 pub(crate) use pedals::DEFAULT_BRAKE_BUILD_UP_MPS3;
 pub use perception::{Evidence, EvidenceConfig, PerceptionConfig, PerceptionSettings};

@@ -35,7 +35,7 @@ pub use driver::{
     OvertakerConfig, PerceptionConfig, PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig,
     Reaction, ReactionChange, ReactionConfig, RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping,
     SpeedKeepingConfig, Thresholds, Weave, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
-    entry_stop_distance_m,
+    entry_change_duration_s, entry_stop_distance_m,
 };
 pub use ego::{
     ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,

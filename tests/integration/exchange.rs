@@ -237,6 +237,28 @@ fn a_sample_of_a_campaign_is_exported_with_its_seed() {
     assert_eq!(code(&output), 2);
 }
 
+#[test]
+fn a_vehicle_on_a_ramp_leaves_its_lane_before_the_end_in_the_closed_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = folder.path().join("case");
+    let said = stdout(&run("tool export ramp-merges 3 --seed 5 --form closed-loop,logical -o", &case), 0);
+    assert!(said.contains("ramp: the gap that it accepts, and its acceleration"), "{said}");
+    // The import refuses a vehicle that drives where its lane has ended.
+    let logical = fs::read_to_string(case.join("logical.xosc")).unwrap();
+    let (before, rest) = logical.split_once("<CustomContent>").unwrap();
+    let (_, behind) = rest.split_once("</CustomContent>").unwrap();
+    fs::write(case.join("elements.xosc"), format!("{before}{behind}")).unwrap();
+    let times = ["closed-loop.xosc", "elements.xosc"].map(|name| {
+        let words = format!("tool import {} -o", case.join(name).display());
+        let said = stdout(&run(&words, &folder.path().join("scenario.toml")), 0);
+        let text = fs::read_to_string(folder.path().join("scenario.toml")).unwrap();
+        assert!(text.contains("id = \"ramp\"") && text.contains("acceleration-lane"), "{text}");
+        let line = said.lines().find(|line| line.ends_with("ramp-changes-lanes begins")).unwrap();
+        line.split_whitespace().next().unwrap().to_owned()
+    });
+    assert_eq!(times[0], times[1]);
+}
+
 /// Runs the quality checkers of ASAM on the files below these folders.
 fn quality(python: &Path, folder: &Path) -> String {
     let script = PathBuf::from(ROOT).join("tests/integration/exchange/quality.py");

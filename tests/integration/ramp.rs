@@ -94,12 +94,12 @@ fn a_campaign_where_a_ramp_merges_has_no_errors_and_is_the_same_in_the_mirror() 
 }
 
 #[test]
-fn an_export_says_that_it_cannot_say_when_a_vehicle_merges() {
+fn an_export_says_that_it_cannot_say_which_gap_a_merging_vehicle_accepts() {
     let folder = folder();
     let words = ["tool", "export", "ramp-merges", "--sensors", "object", "--form", "closed-loop", "-o"];
     let said = stdout(&closecall([&words[..], &[folder.path().to_str().unwrap()]].concat()), 0);
-    assert!(said.contains("ramp: when it leaves the acceleration lane"), "{said}");
-    assert!(!said.contains("front: when it leaves"), "{said}");
+    assert!(said.contains("ramp: the gap that it accepts, and its acceleration"), "{said}");
+    assert!(!said.contains("front: the gap that it accepts"), "{said}");
 }
 
 #[test]

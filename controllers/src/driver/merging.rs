@@ -141,7 +141,8 @@ impl<D: Driver> MergingDriver<D> {
             {
                 self.phase = Phase::Changing;
                 action.note = Some(DriverNote::CutOutStarted);
-                action.lane_change = Some(LaneChange { target, duration_s: duration_s(speed_mps, rest_m) });
+                action.lane_change =
+                    Some(LaneChange { target, duration_s: entry_change_duration_s(speed_mps, rest_m) });
                 return Ok(action);
             }
         }
@@ -222,9 +223,9 @@ fn tolerance(rest_m: f64) -> Tolerance {
     Tolerance { own_mps2: braking_mps2(0), follower_mps2: braking_mps2(1), follower_headway_s: FOLLOWER_HEADWAY_S }
 }
 
-/// Returns the duration of a lane change whose middle, at which the centre of the vehicle crosses
-/// the marking, comes before the end of the lane if the driver can steer that fast (s).
-fn duration_s(speed_mps: f64, rest_m: f64) -> f64 {
+/// Returns the duration of a lane change from an acceleration lane (s). In its middle, the centre of
+/// the vehicle crosses the marking, before the end of the lane if the driver can steer that fast.
+pub fn entry_change_duration_s(speed_mps: f64, rest_m: f64) -> f64 {
     let [longest_s, shortest_s] = DURATION_S;
     (2.0 * rest_m.max(0.0) / speed_mps.max(MIN_SPEED_MPS)).clamp(shortest_s, longest_s)
 }
@@ -368,9 +369,9 @@ mod tests {
 
     #[test]
     fn the_lane_change_is_shorter_near_the_end_and_never_abrupt() {
-        assert_eq!(duration_s(25.0, 250.0), DURATION_S[0]);
-        assert_eq!(duration_s(25.0, 50.0), 4.0);
-        assert_eq!(duration_s(25.0, 1.0), DURATION_S[1]);
-        assert_eq!(duration_s(0.0, 2.0), DURATION_S[0]);
+        assert_eq!(entry_change_duration_s(25.0, 250.0), DURATION_S[0]);
+        assert_eq!(entry_change_duration_s(25.0, 50.0), 4.0);
+        assert_eq!(entry_change_duration_s(25.0, 1.0), DURATION_S[1]);
+        assert_eq!(entry_change_duration_s(0.0, 2.0), DURATION_S[0]);
     }
 }

@@ -10,9 +10,11 @@
 //! | `prescribed` | speed profile, lane changes | at their times |
 //! | `overtaker` | lane change to the passing lane | at the headway from which the marking is crossed at `cut-out-thw-s` |
 //! | `wiedemann99`, `idm` | keeps the gap of equilibrium | where braking at 2 m/s² suffices |
+//! | all but `prescribed`, on a ramp | lane change to the through lane | where the acceleration lane begins |
 
 use closecall_controllers::{
-    DriverConfig, FollowConfig, IdmConfig, OvertakerConfig, PrescribedConfig, Wiedemann99Config,
+    CheckedDriver, DriverConfig, FollowConfig, HumanDriver, IdmConfig, OvertakerConfig, PrescribedConfig,
+    Wiedemann99Config, entry_change_duration_s,
 };
 use closecall_scenarios::openscenario::content_hash;
 use closecall_scenarios::{
@@ -27,7 +29,7 @@ use super::environment;
 use super::expression::{Expression, Values, parameter_name};
 use super::road::UsedRoad;
 use super::scenario::{Document, group, header, private, teleport};
-use super::trigger::{at, event, gap_below, headway_below, started};
+use super::trigger::{at, event, gap_below, headway_below, started, travelled};
 use super::vehicles::axle_to_centre_m;
 
 /// Braking by which a follower comes to its gap (m/s²): an assumption; 1 to 3 are plausible.
@@ -224,9 +226,11 @@ impl Writer<'_> {
     /// Returns the events of a vehicle.
     fn events(&self, index: usize) -> Vec<Element> {
         let Some(config) = self.config_of(index) else { return self.drawn_vehicle(index) };
+        let merging = self.merging(index);
         let mut events = match &config.driver {
             DriverConfig::EgoStack(_) => Vec::new(),
             DriverConfig::Prescribed(prescribed) => self.prescribed(index, prescribed),
+            DriverConfig::Overtaker(_) if merging.is_some() => Vec::new(),
             DriverConfig::Overtaker(overtaker) => self.overtaking(index, overtaker).into_iter().collect(),
             DriverConfig::Wiedemann99(model) => {
                 let gap_m = |speed| self.wiedemann_gap(model, speed);
@@ -234,6 +238,7 @@ impl Writer<'_> {
             }
             DriverConfig::Idm(model) => self.following(index, |speed| self.idm_gap(model, speed)).into_iter().collect(),
         };
+        events.extend(merging);
         events.extend(config.events.iter().zip(0..).filter_map(|(event, number)| self.event(index, event, number)));
         events
     }
@@ -245,13 +250,14 @@ impl Writer<'_> {
             .traffic
             .iter()
             .find(|traffic| id.strip_prefix(traffic.id.as_str()).is_some_and(|rest| rest.starts_with('-')));
+        let merging = self.merging(index);
         let event = match drawn.map(|traffic| &traffic.driver) {
             Some(DriverConfig::Wiedemann99(model)) => self.following(index, |speed| self.wiedemann_gap(model, speed)),
             Some(DriverConfig::Idm(model)) => self.following(index, |speed| self.idm_gap(model, speed)),
-            Some(DriverConfig::Overtaker(overtaker)) => self.overtaking(index, overtaker),
+            Some(DriverConfig::Overtaker(overtaker)) if merging.is_none() => self.overtaking(index, overtaker),
             _ => None,
         };
-        event.into_iter().collect()
+        event.into_iter().chain(merging).collect()
     }
 
     /// Returns the gap of equilibrium of Wiedemann 99, cc0 + cc1·v + cc2/2 (m).
@@ -313,6 +319,42 @@ impl Writer<'_> {
         };
         let when = headway_below(&format!("{name}-comes-close-to-{lead}"), name, lead, begins_s);
         Some(event(&cut_out_name(name), "override", change_lanes(lane, duration), when))
+    }
+
+    /// Returns the lane change of a driver who enters the road on the acceleration lane, or `None`
+    /// if the driver does not.
+    fn merging(&self, index: usize) -> Option<Element> {
+        let (road, actor) = (&self.scenario.road, &self.scenario.actors[index]);
+        let (lane, config) = (road.acceleration_lane()?, self.config.road.acceleration_lane.as_ref()?);
+        if !enters(self.scenario, index) {
+            return None;
+        }
+        let target = road.beside(self.start_lane(index), road.overtaking_side())?;
+        let rest_m = lane.to_m - lane.from_m - 0.5 * actor.vehicle.dimensions.length_m;
+        let duration_s = entry_change_duration_s(actor.start.speed_mps, rest_m);
+        let way_m = match actor.start.s_m < lane.from_m {
+            true => self.values.expression(&config.from_m) - self.start_m(index),
+            false => 0.0.into(),
+        };
+        let name = actor.id.as_str();
+        let when = travelled(&format!("{name}-leaves-the-ramp"), name, way_m);
+        Some(event(&cut_out_name(name), "parallel", change_lanes(target, duration_s.into()), when))
+    }
+
+    /// Returns the position of the centre of a vehicle at the start (m).
+    fn start_m(&self, index: usize) -> Expression {
+        let of_sample = self.scenario.actors[index].start.s_m.into();
+        let Some(config) = self.config_of(index).filter(|_| self.values.are_named) else { return of_sample };
+        let (relative, sign) = match &config.start {
+            StartConfig::Absolute(start) => return self.values.expression(&start.s_m),
+            StartConfig::Ahead(relative) => (relative, 1.0),
+            StartConfig::Behind(relative) => (relative, -1.0),
+        };
+        let Some(reference) = self.index_of(&relative.of) else { return of_sample };
+        let back = if sign > 0.0 { reference } else { index };
+        let halves_m = [index, reference].map(|actor| 0.5 * self.vehicle(actor).dimensions.length_m);
+        let distance_m = self.gap(index, relative, back) + (halves_m[0] + halves_m[1]).into();
+        self.start_m(reference) + distance_m * sign.into()
     }
 
     /// Returns the time headway of the safe gap of a car-following model (s), and its value in the
@@ -433,6 +475,9 @@ impl Writer<'_> {
 
     /// Returns whether a vehicle has an event with the name of [`cut_out_name`].
     fn changes_lanes(&self, index: usize) -> bool {
+        if self.merging(index).is_some() {
+            return true;
+        }
         match self.config_of(index).map(|config| &config.driver) {
             Some(DriverConfig::Overtaker(config)) => self.overtaking(index, config).is_some(),
             Some(DriverConfig::Prescribed(config)) => !config.lane_changes.is_empty(),
@@ -466,6 +511,13 @@ impl Writer<'_> {
         let ends = gap / closing + AFTER_ENCOUNTER_S.into();
         begins.clone() + self.values.expression(&config.phase) * (ends - begins)
     }
+}
+
+/// Returns whether a human driver finds the way from the acceleration lane to the through lane.
+fn enters(scenario: &Scenario, index: usize) -> bool {
+    let actor = &scenario.actors[index];
+    let merges = matches!(&actor.driver, CheckedDriver::Human(human) if !matches!(human, HumanDriver::Prescribed(_)));
+    merges && scenario.road.entry_lane() == Some(scenario.road.lane_at(actor.start.d_m))
 }
 
 /// Returns the name of the event in which a vehicle first changes lanes.
@@ -535,9 +587,13 @@ pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bo
             }
             DriverConfig::EgoStack(_) | DriverConfig::Prescribed(_) => {}
         }
-        let starts = scenario.actors.iter().find(|checked| checked.id == *id).map(|checked| checked.start.d_m);
-        if starts.is_some_and(|d_m| scenario.road.entry_lane() == Some(scenario.road.lane_at(d_m))) {
-            list.push(format!("{id}: when it leaves the acceleration lane: it finds a gap itself"));
+        let merges = |id: &ActorId| {
+            (0..scenario.actors.len()).any(|index| scenario.actors[index].id == *id && enters(scenario, index))
+        };
+        if merges(id) {
+            list.push(format!(
+                "{id}: the gap that it accepts, and its acceleration: it changes lanes where the acceleration lane begins"
+            ));
         }
         if actor.lane_keeping.is_some() {
             list.push(format!("{id}: its weaving within the lane"));
@@ -548,6 +604,7 @@ pub(super) fn unsaid(config: &ScenarioConfig, scenario: &Scenario, are_named: bo
         let refers_to_missing = actor.events.iter().any(|event| match &event.when {
             TriggerConfig::CutOutStarted(cut_out) => config.actors.iter().any(|other| {
                 other.id == cut_out.actor
+                    && !merges(&other.id)
                     && matches!(
                         other.driver,
                         DriverConfig::Wiedemann99(_) | DriverConfig::Idm(_) | DriverConfig::EgoStack(_)

@@ -39,6 +39,12 @@ pub(super) fn gap_below(name: &str, from: &str, to: &str, gap_m: Expression) -> 
     condition(name, 0.0.into(), by_entity(from, gap))
 }
 
+/// Returns the condition that a vehicle has driven a distance since the start (m).
+pub(super) fn travelled(name: &str, entity: &str, distance_m: Expression) -> Element {
+    let distance = Element::new("TraveledDistanceCondition").with("value", distance_m);
+    condition(name, 0.0.into(), by_entity(entity, distance))
+}
+
 /// Returns the condition that an event of this name started some time ago (s).
 pub(super) fn started(name: &str, event: &str, delay_s: Expression) -> Element {
     let state = Element::new("StoryboardElementStateCondition")
