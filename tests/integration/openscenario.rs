@@ -741,6 +741,11 @@ fn faults_of_attributes() -> Vec<(&'static str, &'static str, &'static [&'static
         ("storyboardElementType=\"event\"", "storyboardElementType=\"deed\"", &["`deed`", "act, action, event"]),
         ("state=\"completeState\"", "state=\"done\"", &["`state` is `done`", "completeState, endTransition"]),
         ("speedTargetValueType=\"delta\"", "speedTargetValueType=\"sum\"", &["RelativeTargetSpeed", "delta, factor"]),
+        (
+            "<AbsoluteTargetSpeed value=\"10\"/>",
+            "<RelativeTargetSpeed entityRef=\"Ego\" value=\"-5\" speedTargetValueType=\"delta\" continuous=\"true\"/>",
+            &["case.xosc:102: `SpeedActionDynamics`", "`dynamicsShape` must be `step`"],
+        ),
         ("continuous=\"false\"", "continuous=\"no\"", &["`RelativeTargetSpeed`", "`continuous` is `no`"]),
         ("laneId=\"-1\"", "laneId=\"-1.5\"", &["`LanePosition`", "`laneId` is `-1.5`", "whole number"]),
         ("vehicleCategory=\"truck\"", "vehicleCategory=\"lorry\"", &[":26:", "`lorry`", "bicycle, bus, car"]),
@@ -989,6 +994,139 @@ fn an_action_ends_with_its_event_so_that_a_condition_sees_it() {
     assert!(by_action != SCENARIO);
     let said = stdout(&imported(&written(folder.path(), &by_action, ROAD), &output, &[]), 0);
     assert!((time_of(&said, "brake begins") - 7.5).abs() <= 0.021, "{said}");
+}
+
+/// Returns a trigger by the state of an element.
+fn by_state(kind: &str, path: &str, state: &str) -> String {
+    format!(
+        "<StoryboardElementStateCondition storyboardElementType=\"{kind}\" storyboardElementRef=\"{path}\" \
+         state=\"{state}\"/>"
+    )
+}
+
+/// Returns the scenario with a further manoeuvre, whose event `brake` begins by a condition and
+/// slows the truck down by 2 m/s in 2 s.
+fn with_second_brake(condition: &str) -> String {
+    let maneuver = format!(
+        "<Maneuver name=\"later\"><Event name=\"brake\" priority=\"parallel\" maximumExecutionCount=\"1\">\
+         <Action name=\"brake-action\"><PrivateAction><LongitudinalAction><SpeedAction>\
+         <SpeedActionDynamics dynamicsShape=\"linear\" value=\"2\" dynamicsDimension=\"time\"/>\
+         <SpeedActionTarget><AbsoluteTargetSpeed value=\"8\"/></SpeedActionTarget>\
+         </SpeedAction></LongitudinalAction></PrivateAction></Action><StartTrigger><ConditionGroup>\
+         <Condition name=\"then\" delay=\"1\" conditionEdge=\"none\"><ByValueCondition>{condition}</ByValueCondition>\
+         </Condition></ConditionGroup></StartTrigger></Event></Maneuver>"
+    );
+    let text = SCENARIO.replacen("        </ManeuverGroup>", &format!("{maneuver}</ManeuverGroup>"), 1);
+    assert!(text != SCENARIO);
+    text
+}
+
+#[test]
+fn elements_with_one_name_have_states_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // The act has the name of an event, and goes on when the event ends.
+    let text = SCENARIO.replacen("<Act name=\"act\">", "<Act name=\"cut-in\">", 1);
+    let said = stdout(&imported(&written(folder.path(), &text, ROAD), &output, &[]), 0);
+    assert!((time_of(&said, "brake begins") - 7.5).abs() <= 0.021, "{said}");
+    // The first event `brake` ends at 12.5 s, and the second one ends by itself.
+    for path in ["maneuver::brake", "story::act::group::maneuver::brake"] {
+        let text = with_second_brake(&by_state("event", path, "completeState"));
+        let said = stdout(&imported(&written(folder.path(), &text, ROAD), &output, &[]), 0);
+        assert!((time_of(&said, " maneuver ends") - 12.5).abs() <= 0.031, "{said}");
+        assert!((time_of(&said, "later ends") - 15.5).abs() <= 0.041, "{said}");
+        assert_eq!(said.matches("brake ends").count(), 2, "{said}");
+    }
+    let text = with_second_brake(&by_state("event", "brake", "completeState"));
+    let refused = imported(&written(folder.path(), &text, ROAD), &output, &[]);
+    assert_eq!(code(&refused), 3);
+    let word = "`brake` is the name of 2 elements: one of them is the event `story::act::group::maneuver::brake`";
+    assert!(message(&refused).contains(word), "{}", message(&refused));
+}
+
+#[test]
+fn what_stands_around_events_ends_with_the_last_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let act = |name: &str, group: &str, condition: &str| {
+        let text = with_second_brake(condition);
+        let maneuver = text.split_once("<Maneuver name=\"later\">").unwrap().1.split_once("</Maneuver>").unwrap().0;
+        format!(
+            "<Act name=\"{name}\"><ManeuverGroup name=\"{group}\" maximumExecutionCount=\"1\">\
+             <Actors selectTriggeringEntities=\"false\"><EntityRef entityRef=\"Slow_Truck\"/></Actors>\
+             <Maneuver name=\"later\">{maneuver}</Maneuver></ManeuverGroup><StartTrigger/></Act>"
+        )
+    };
+    for (kind, name) in [("maneuverGroup", "group"), ("act", "act"), ("story", "story")] {
+        let second = act("second", "others", &by_state(kind, name, "completeState"));
+        let text =
+            SCENARIO.replacen("    <StopTrigger>", &format!("<Story name=\"more\">{second}</Story><StopTrigger>"), 1);
+        assert!(text != SCENARIO);
+        let said = stdout(&imported(&written(folder.path(), &text, ROAD), &output, &[]), 0);
+        assert!((time_of(&said, "later ends") - 15.5).abs() <= 0.061, "{kind}: {said}");
+    }
+}
+
+#[test]
+fn a_place_of_the_road_triggers_by_distance_time_and_arrival() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let headway =
+        "<TimeHeadwayCondition entityRef=\"Slow_Truck\" value=\"$Headway\" freespace=\"false\" rule=\"lessThan\"/>";
+    let place = |lane: i32| format!("<Position><LanePosition roadId=\"1\" laneId=\"{lane}\" s=\"230\"/></Position>");
+    let along = "coordinateSystem=\"road\" relativeDistanceType=\"longitudinal\"";
+    // The ego drives 30 m/s from 50 m on; its front is 3.7 m ahead of its reference point.
+    let conditions = [
+        (
+            format!(
+                "<DistanceCondition value=\"30\" freespace=\"false\" rule=\"lessThan\">{}</DistanceCondition>",
+                place(-1)
+            ),
+            5.0,
+        ),
+        (
+            format!(
+                "<DistanceCondition value=\"30\" freespace=\"true\" rule=\"lessThan\" {along}>{}</DistanceCondition>",
+                place(-2)
+            ),
+            (150.0 - 3.7) / 30.0,
+        ),
+        // The centres of the lanes are 3.5 m apart.
+        (
+            format!(
+                "<DistanceCondition value=\"4\" freespace=\"false\" rule=\"lessThan\">{}</DistanceCondition>",
+                place(-2)
+            ),
+            (180.0 - (16.0_f64 - 3.5 * 3.5).sqrt()) / 30.0,
+        ),
+        (format!("<ReachPositionCondition tolerance=\"6\">{}</ReachPositionCondition>", place(-1)), 174.0 / 30.0),
+        (
+            format!(
+                "<TimeToCollisionCondition value=\"2\" freespace=\"false\" rule=\"lessThan\">\
+                 <TimeToCollisionConditionTarget>{}</TimeToCollisionConditionTarget></TimeToCollisionCondition>",
+                place(-1)
+            ),
+            4.0,
+        ),
+    ];
+    for (condition, expected_s) in conditions {
+        let text = SCENARIO.replacen(headway, &condition, 1);
+        assert!(text != SCENARIO);
+        let said = stdout(&imported(&written(folder.path(), &text, ROAD), &output, &[]), 0);
+        assert!((time_of(&said, "cut-in begins") - expected_s).abs() <= 0.021, "{condition}: {expected_s} s: {said}");
+    }
+}
+
+#[test]
+fn the_controllers_of_a_file_are_named_as_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let controller = "<ObjectController><Controller name=\"driver\"><Properties/></Controller></ObjectController>";
+    let text = SCENARIO.replace("    </ScenarioObject>", &format!("{controller}</ScenarioObject>"));
+    assert_eq!(text.matches(controller).count(), 2);
+    let said = stdout(&imported(&written(folder.path(), &text, ROAD), &output, &[]), 0);
+    assert!(said.contains("line 24: the controller of `Ego`: the controller under test drives instead"), "{said}");
+    assert!(said.contains("line 35: the controller of `Slow_Truck`: it drives as the actions say"), "{said}");
 }
 
 /// A scenario with a second act, in which the truck slows down from 4 s on. Its manoeuvre has
@@ -1334,6 +1472,7 @@ fn the_events_of_a_cut_in_are_those_of_esmini_within_a_step() {
     let said = stdout(&imported(&path, &output, &[]), 0);
     assert!((time_of(&said, "OvertakerBrakeEvent begins") - 7.74).abs() <= STEP_S, "{said}");
     assert!((time_of(&said, "CutInManeuver ends") - 16.74).abs() <= STEP_S, "{said}");
+    assert!((time_of(&said, "storyboard ends") - 21.74).abs() <= STEP_S, "{said}");
 }
 
 /// Returns the alignment of an imported scenario, as pairs of position and curvature.
@@ -1365,6 +1504,60 @@ fn a_road_of_lines_arcs_and_spirals_is_the_alignment_of_the_scenario() {
     }
     let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"];
     json(&closecall(run), 0);
+}
+
+#[test]
+fn heights_other_roads_and_the_end_of_a_road_are_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let profile = |height: &str, slope: &str| {
+        format!(
+            "</planView><elevationProfile><elevation s=\"0\" a=\"12\" b=\"{height}\" c=\"0\" d=\"0\"/></elevationProfile>\
+             <lateralProfile><superelevation s=\"0\" a=\"{slope}\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile>"
+        )
+    };
+    let road = |from: &str, to: &str| {
+        let text = ROAD.replace(from, to);
+        assert!(text != ROAD, "{from}");
+        text
+    };
+    let (_, rest) = ROAD.split_once("<road ").unwrap();
+    let second = rest.split_once("</road>").unwrap().0.replace("id=\"1\"", "id=\"2\"");
+    let cases = [
+        (road("</planView>", &profile("0", "0")), None),
+        (road("</planView>", &profile("0.03", "0")), Some("the road has a height that changes")),
+        (road("</planView>", &profile("0", "0.04")), Some("the road has a slope across it")),
+        (road("</road>", &format!("</road><road {second}</road>")), Some("the road has 1 road beside it in its file")),
+        // The ego drives 30 m/s from 50 m on, and the truck 20 m/s from 110 m on.
+        (road("length=\"3000\"", "length=\"500\""), Some("`Ego` drives beyond the end of the road at 15.01 s")),
+        (road("length=\"3000\"", "length=\"700\""), None),
+    ];
+    for (text, note) in cases {
+        let said = stdout(&imported(&written(folder.path(), SCENARIO, &text), &output, &[]), 0);
+        let notes = ["a height", "a slope", "beside it in its file", "beyond the end"];
+        let said_notes = notes.iter().filter(|note| said.contains(**note)).count();
+        assert_eq!(said_notes, usize::from(note.is_some()), "{said}");
+        assert!(note.is_none_or(|note| said.contains(note)), "{said}");
+    }
+}
+
+#[test]
+fn a_winding_road_keeps_all_its_curves() {
+    let Some(data) = closecall_testing::data() else { return };
+    let path = data.join("osc_alks/concrete_scenarios/alks_scenario_4_1_1_free_driving_template.xosc");
+    if !path.is_file() {
+        closecall_testing::skip(closecall_testing::Need::Data, "CLOSECALL_DATA has no osc_alks");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    stdout(&imported(&path, &output, &[]), 0);
+    // The road of the file has 33 lines, arcs and spirals, with radii from 250 m to 2000 m.
+    let points = alignment_of(&output);
+    assert_eq!(points.len(), 34, "{points:?}");
+    for expected in [[600.0, 0.004], [1_300.0, -0.004], [4_900.0, -0.0005]] {
+        assert!(points.contains(&expected), "{expected:?}: {points:?}");
+    }
 }
 
 #[test]

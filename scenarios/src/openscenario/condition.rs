@@ -6,9 +6,12 @@
 //!  condition = value, then edge, then delay
 //! ```
 
+use closecall_traffic::maths;
+
 use super::dom::{ImportError, Node};
+use super::plane::RoadPoint;
 use super::reader::is_true;
-use super::storyboard::{ElementState, Storyboard, StoryboardElement};
+use super::storyboard::{ElementState, Storyboard};
 use super::world::Vehicle;
 
 /// Difference of two values that are the same but for rounding: numerical.
@@ -115,13 +118,20 @@ impl Storyboard<'_> {
             "StoryboardElementStateCondition" => {
                 let stated = reader.text(node, "storyboardElementRef")?;
                 let state = reader.text(node, "state")?;
-                // A path such as `story::act` ends with the element's name.
-                let name = stated.rsplit("::").next().unwrap_or_default();
                 let kind = reader.text(node, "storyboardElementType")?;
-                if !self.names.contains(&StoryboardElement { kind: kind.clone(), name: name.to_owned() }) {
-                    return Err(reader.error(node, format!("there is no {kind} `{name}` in the storyboard")));
-                }
-                let Some(element) = self.states.get(name) else { return Ok(state == "standbyState") };
+                let named: Vec<_> =
+                    self.elements.iter().filter(|element| element.kind == kind && element.is_named(&stated)).collect();
+                let id = match named[..] {
+                    [element] => element.id,
+                    [] => return Err(reader.error(node, format!("there is no {kind} `{stated}` in the storyboard"))),
+                    [first, ..] => {
+                        let (count, path) = (named.len(), first.path.join("::"));
+                        let message =
+                            format!("`{stated}` is the name of {count} elements: one of them is the {kind} `{path}`");
+                        return Err(reader.error(node, message));
+                    }
+                };
+                let Some(element) = self.states.get(&id) else { return Ok(state == "standbyState") };
                 let ElementState { started_s, ended_s } = *element;
                 let has_started = started_s <= self.time_s;
                 match state.as_str() {
@@ -150,17 +160,33 @@ impl Storyboard<'_> {
             "TimeToCollisionCondition" => {
                 let target = reader.child(node, &["TimeToCollisionConditionTarget"])?;
                 let entity = reader.only(target)?;
-                if entity.name != "EntityRef" {
-                    return Err(reader.error(entity, "the target must be an `EntityRef`"));
-                }
-                let other = self.vehicle(entity, "entityRef")?;
-                let distance_m = vehicle.distance_m(other, is_true(node, "freespace"));
-                let closing_mps = (vehicle.speed_mps - other.speed_mps) * distance_m.signum();
+                let is_free_space = is_true(node, "freespace");
+                let (distance_m, other_mps) = match entity.name.as_str() {
+                    "EntityRef" => {
+                        let other = self.vehicle(entity, "entityRef")?;
+                        (vehicle.distance_m(other, is_free_space), other.speed_mps)
+                    }
+                    _ => (vehicle.distance_to_m(self.place_on_road(entity)?.s_m, is_free_space), 0.0),
+                };
+                let closing_mps = (vehicle.speed_mps - other_mps) * distance_m.signum();
                 Ok(closing_mps > 0.0 && self.compare(node, distance_m.abs() / closing_mps)?)
             }
             "RelativeDistanceCondition" => {
                 let other = self.vehicle(node, "entityRef")?;
                 self.compare(node, vehicle.distance_m(other, is_true(node, "freespace")).abs())
+            }
+            "DistanceCondition" => {
+                let place = self.place_on_road(reader.child(node, &["Position"])?)?;
+                let along_m = vehicle.distance_to_m(place.s_m, is_true(node, "freespace")).abs();
+                // Without a type, the standard means the straight distance.
+                let is_along = node.raw("relativeDistanceType").is_some() || is_true(node, "alongRoute");
+                let across_m = if is_along { 0.0 } else { self.across_m(vehicle, &place) };
+                self.compare(node, maths::hypot(along_m, across_m))
+            }
+            "ReachPositionCondition" => {
+                let place = self.place_on_road(reader.child(node, &["Position"])?)?;
+                let away_m = maths::hypot(place.s_m - vehicle.s_m, self.across_m(vehicle, &place));
+                Ok(away_m <= reader.number(node, "tolerance")?)
             }
             "SpeedCondition" => self.compare(node, vehicle.speed_mps),
             "AccelerationCondition" => self.compare(node, vehicle.acceleration_mps2.abs()),
@@ -171,6 +197,17 @@ impl Storyboard<'_> {
             "TraveledDistanceCondition" => Ok(vehicle.travelled_m >= reader.number(node, "value")?),
             _ => Err(reader.error(node, "this condition is not read")),
         }
+    }
+
+    /// Returns the place on the road that an element `Position` states.
+    fn place_on_road(&self, node: &Node) -> Result<RoadPoint, ImportError> {
+        self.on_road(self.reader.only(node)?, None)
+    }
+
+    /// Returns the distance between a vehicle and a place across the road (m).
+    fn across_m(&self, vehicle: &Vehicle, place: &RoadPoint) -> f64 {
+        let centre_m = self.road.index(vehicle.lane).map_or(f64::NAN, |index| self.road.centres_m[index]);
+        place.t_m - (centre_m + vehicle.offset_m)
     }
 
     fn compare(&self, node: &Node, left: f64) -> Result<bool, ImportError> {

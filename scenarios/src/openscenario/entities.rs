@@ -16,8 +16,8 @@ use super::world::Vehicle;
 #[derive(Default)]
 pub(super) struct Entities {
     pub(super) vehicles: Vec<Vehicle>,
-    /// The names of the vehicles that have a controller.
-    pub(super) controlled: Vec<String>,
+    /// The vehicles that have a controller, with the lines on which it stands.
+    pub(super) controlled: Vec<(String, usize)>,
     /// The parts of the catalogues that are left out.
     pub(super) notes: Vec<String>,
 }
@@ -43,7 +43,7 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError
             match child.name.as_str() {
                 "Vehicle" => vehicle = Some(read_vehicle(reader, child)?),
                 "CatalogReference" => vehicle = Some(vehicle_in_catalog(reader, root, &mut catalogs, child)?),
-                "ObjectController" => entities.controlled.push(name.clone()),
+                "ObjectController" => entities.controlled.push((name.clone(), child.line)),
                 _ => {
                     return Err(reader.error(
                         child,

@@ -211,6 +211,11 @@ fn import_scenario(reader: &Reader, mut root: Node, options: &ImportOptions) -> 
     let mut played = Storyboard::new(reader.clone(), &road, vehicles, ego);
     played.notes = notes;
     played.notes.extend(road.notes.iter().map(|note| format!("the road has {note}")));
+    for (name, line) in &controlled {
+        if let Some(vehicle) = played.vehicles.iter().position(|vehicle| vehicle.name == *name) {
+            played.note_controller(*line, vehicle);
+        }
+    }
     let globals = played.init(storyboard)?;
     let starts = played.vehicles.clone();
     played.play(storyboard)?;
@@ -351,7 +356,7 @@ fn ego_of(
     reader: &Reader,
     root: &Node,
     vehicles: &[Vehicle],
-    controlled: &[String],
+    controlled: &[(String, usize)],
     asked: Option<&str>,
 ) -> Result<usize, ImportError> {
     let position = |name: &str| vehicles.iter().position(|vehicle| vehicle.name == name);
@@ -364,7 +369,7 @@ fn ego_of(
         (Some(name), _) => position(name).map_or_else(|| refuse(format!("there is no vehicle `{name}`")), Ok),
         (None, controlled) => {
             let usual = vehicles.iter().position(|vehicle| vehicle.name.eq_ignore_ascii_case("ego"));
-            let only = if let [name] = controlled { position(name) } else { None };
+            let only = if let [(name, _)] = controlled { position(name) } else { None };
             usual
                 .or(only)
                 .map_or_else(|| refuse("no vehicle is named `Ego`, and not one alone has a controller".to_owned()), Ok)

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use closecall_traffic::words::counted;
 use closecall_traffic::{AccelerationLane, Alignment, Road};
 
 use super::course;
@@ -232,7 +233,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     let length_m = shape::check(path, road)?;
     let Some(lanes) = road.child("lanes") else { return Err(road.error(path, "it has no `lanes`")) };
     let Some(first) = lanes.child("laneSection") else { return Err(lanes.error(path, "it has no `laneSection`")) };
-    let mut notes = Vec::new();
+    let mut notes = surroundings(&root, road);
     // With left-hand traffic, the lanes along the road are those on the left.
     let is_left_hand = match road.raw("rule") {
         Some("LHT") => true,
@@ -316,6 +317,27 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         speed_limit_mps,
         notes,
     })
+}
+
+/// Returns the notes on the network and the heights of a road, which a scenario does not have.
+fn surroundings(root: &Node, road: &Node) -> Vec<String> {
+    let mut notes = Vec::new();
+    if let others @ 1.. = root.all("road").count().saturating_sub(1) {
+        notes.push(format!("{} beside it in its file, and a scenario has one road", counted(others, "road")));
+    }
+    let has = |profile: &str, names: &[&str]| {
+        let pieces = road.child(profile).into_iter().flat_map(|profile| &profile.children);
+        pieces.into_iter().any(|piece| names.iter().any(|name| value(piece, name) != 0.0))
+    };
+    let heights = road.child("elevationProfile").into_iter().flat_map(|profile| profile.all("elevation"));
+    let heights: Vec<f64> = heights.map(|piece| value(piece, "a")).collect();
+    if has("elevationProfile", &["b", "c", "d"]) || heights.windows(2).any(|pair| pair[0] != pair[1]) {
+        notes.push("a height that changes, and the road of a scenario is level".to_owned());
+    }
+    if has("lateralProfile", &["a", "b", "c", "d"]) {
+        notes.push("a slope across it, and the road of a scenario is level".to_owned());
+    }
+    notes
 }
 
 /// Returns a number that `shape::check` has checked, or 0 if it is absent.

@@ -329,7 +329,7 @@ const POSITIONS: [&str; 10] = [
     "TrajectoryPosition",
 ];
 
-static ELEMENTS: [Element; 155] = [
+static ELEMENTS: [Element; 157] = [
     element(
         "OpenSCENARIO",
         &[],
@@ -674,6 +674,20 @@ static ELEMENTS: [Element; 155] = [
         &["TimeToCollisionConditionTarget"],
     ),
     element("TimeToCollisionConditionTarget", &[], &["Position", "EntityRef"]),
+    element(
+        "DistanceCondition",
+        &[
+            boolean("alongRoute"),
+            boolean("freespace"),
+            some("relativeDistanceType", &RELATIVE_DISTANCE_TYPE, &LONGITUDINAL),
+            word("rule", &RULE),
+            at_least_0("value"),
+            some("coordinateSystem", &COORDINATE_SYSTEM, &ALONG_THE_ROAD),
+            word("routingAlgorithm", &ROUTING_ALGORITHM),
+        ],
+        &["Position"],
+    ),
+    element("ReachPositionCondition", &[at_least_0("tolerance")], &["Position"]),
     element(
         "RelativeDistanceCondition",
         &[

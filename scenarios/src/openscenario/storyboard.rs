@@ -51,12 +51,25 @@ pub(super) struct ElementState {
     pub(super) ended_s: Option<f64>,
 }
 
-/// An element of the storyboard by which a condition names it.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// An element of the storyboard, which a condition names.
+#[derive(Clone, Debug)]
 pub(super) struct StoryboardElement {
     /// Its kind as in `storyboardElementType`, such as `maneuverGroup`.
     pub(super) kind: String,
-    pub(super) name: String,
+    /// The names of the elements around it, from the story on, and its own name.
+    pub(super) path: Vec<String>,
+    /// Number of the element in the document.
+    pub(super) id: usize,
+}
+
+impl StoryboardElement {
+    /// Returns whether the element has this name, behind the names of some elements around it.
+    pub(super) fn is_named(&self, stated: &str) -> bool {
+        let Some((own, around)) = self.path.split_last() else { return false };
+        let (before, name) = stated.rsplit_once("::").unwrap_or(("", stated));
+        let mut around = around.iter();
+        own == name && (before.is_empty() || before.split("::").all(|wanted| around.any(|name| name == wanted)))
+    }
 }
 
 /// A lane change that a vehicle makes.
@@ -97,13 +110,15 @@ enum Running {
 #[derive(Clone, Debug)]
 struct RunningEvent {
     name: String,
-    /// The number of its manoeuvre in the document. Two acts may have manoeuvres of one name.
+    /// Number of the event in the document.
+    id: usize,
+    /// Number of its manoeuvre in the document.
     maneuver: usize,
     is_longitudinal: Vec<usize>,
     /// The vehicles that it moves sideways.
     is_lateral: Vec<usize>,
-    /// The names of its actions. Each ends with the event.
-    names: Vec<String>,
+    /// The numbers of its actions in the document. Each ends with the event.
+    action_ids: Vec<usize>,
     actions: Vec<Running>,
 }
 
@@ -116,8 +131,10 @@ pub(super) struct Storyboard<'a> {
     pub(super) ego: usize,
     pub(super) time_s: f64,
     pub(super) memories: BTreeMap<usize, Memory>,
-    pub(super) states: BTreeMap<String, ElementState>,
-    pub(super) names: BTreeSet<StoryboardElement>,
+    /// When elements began and ended, by their numbers in the document: names are unique among the
+    /// elements beside each other alone.
+    pub(super) states: BTreeMap<usize, ElementState>,
+    pub(super) elements: Vec<StoryboardElement>,
     running: Vec<RunningEvent>,
     done: BTreeSet<usize>,
     /// Time and speed of each vehicle in each step.
@@ -150,7 +167,7 @@ impl<'a> Storyboard<'a> {
             time_s: 0.0,
             memories: BTreeMap::new(),
             states: BTreeMap::new(),
-            names: BTreeSet::new(),
+            elements: Vec::new(),
             running: Vec::new(),
             done: BTreeSet::new(),
             speeds,
@@ -180,14 +197,21 @@ impl<'a> Storyboard<'a> {
 
     /// Plays the storyboard to its end.
     pub(super) fn play(&mut self, storyboard: &Node) -> Result<(), ImportError> {
-        self.collect_names(storyboard);
+        self.collect_elements(storyboard, &[]);
         let road = self.road;
         let sections = &road.sections;
         let [mut first_section, mut last_section] = [usize::MAX, 0];
         let mut last_action_s = 0.0;
+        let mut have_left = vec![false; self.vehicles.len()];
         loop {
-            for act in storyboard.all("Story").flat_map(|story| story.all("Act")) {
-                self.act(act)?;
+            for story in storyboard.all("Story") {
+                self.start(story.id);
+                for act in story.all("Act") {
+                    self.act(act)?;
+                }
+                if self.have_ended(story.all("Act")) {
+                    self.end(story.id);
+                }
             }
             if !self.running.is_empty() {
                 last_action_s = self.time_s;
@@ -195,6 +219,12 @@ impl<'a> Storyboard<'a> {
             for (index, vehicle) in self.vehicles.iter().enumerate() {
                 self.speeds[index].push((self.time_s, vehicle.speed_mps));
                 self.offsets[index].push([vehicle.travelled_m, vehicle.offset_m]);
+                if vehicle.s_m > road.length_m + ROUNDING_M && !std::mem::replace(&mut have_left[index], true) {
+                    self.notes.push(format!(
+                        "`{}` drives beyond the end of the road at {:.2} s: the road goes on as it ends",
+                        vehicle.name, self.time_s
+                    ));
+                }
                 let section = sections.at(vehicle.s_m);
                 if !sections.has(section, vehicle.lane) {
                     return Err(self.no_lane(vehicle));
@@ -207,6 +237,7 @@ impl<'a> Storyboard<'a> {
             let limit_s = if stop.is_some() { LONGEST_S } else { last_action_s + AFTER_LAST_S };
             if stops || self.time_s >= limit_s.min(LONGEST_S) {
                 self.end_s = self.time_s;
+                self.events.push((self.time_s, "storyboard ends".to_owned()));
                 if !stops && stop.is_some() {
                     self.notes
                         .push(format!("the stop trigger never fires within {LONGEST_S} s: the scenario ends there"));
@@ -242,47 +273,62 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    fn collect_names(&mut self, node: &Node) {
+    fn collect_elements(&mut self, node: &Node, around: &[String]) {
         for child in &node.children {
+            let mut path = around.to_vec();
             if matches!(child.name.as_str(), "Story" | "Act" | "ManeuverGroup" | "Maneuver" | "Event" | "Action")
                 && let Some(name) = child.raw("name")
             {
+                path.push(name.to_owned());
                 let kind = child.name[..1].to_ascii_lowercase() + &child.name[1..];
-                self.names.insert(StoryboardElement { kind, name: name.to_owned() });
+                self.elements.push(StoryboardElement { kind, path: path.clone(), id: child.id });
             }
-            self.collect_names(child);
+            self.collect_elements(child, &path);
         }
     }
 
-    fn start(&mut self, name: &str) {
+    fn start(&mut self, id: usize) {
         let started = ElementState { started_s: self.time_s, ended_s: None };
-        self.states.entry(name.to_owned()).or_insert(started);
+        self.states.entry(id).or_insert(started);
     }
 
-    fn end(&mut self, name: &str) {
+    /// Ends an element that has begun. Returns whether it had not ended before.
+    fn end(&mut self, id: usize) -> bool {
         let time_s = self.time_s;
-        if let Some(state) = self.states.get_mut(name).filter(|state| state.ended_s.is_none()) {
-            state.ended_s = Some(time_s);
-            self.events.push((time_s, format!("{name} ends")));
+        let running = self.states.get_mut(&id).filter(|state| state.ended_s.is_none());
+        running.map(|state| state.ended_s = Some(time_s)).is_some()
+    }
+
+    /// Ends an element, and tells it to the reader of the result.
+    fn end_told(&mut self, id: usize, name: &str) {
+        if self.end(id) {
+            self.events.push((self.time_s, format!("{name} ends")));
         }
+    }
+
+    fn has_ended(&self, id: usize) -> bool {
+        self.states.get(&id).is_some_and(|state| state.ended_s.is_some())
+    }
+
+    fn have_ended<'n>(&self, mut nodes: impl Iterator<Item = &'n Node>) -> bool {
+        nodes.all(|node| self.has_ended(node.id))
     }
 
     fn act(&mut self, act: &Node) -> Result<(), ImportError> {
-        let name = act.raw("name").unwrap_or_default().to_owned();
-        if self.states.get(&name).is_some_and(|state| state.ended_s.is_some()) {
+        if self.has_ended(act.id) {
             return Ok(());
         }
-        if !self.states.contains_key(&name) {
+        if !self.states.contains_key(&act.id) {
             if !self.is_triggered(act.child("StartTrigger"))? {
                 return Ok(());
             }
-            self.start(&name);
+            self.start(act.id);
         }
         if let Some(stop) = act.child("StopTrigger").filter(|trigger| !trigger.children.is_empty())
             && self.is_triggered(Some(stop))?
         {
             self.stop_act(act);
-            self.end(&name);
+            self.end_told(act.id, act.raw("name").unwrap_or_default());
             return Ok(());
         }
         for group in act.all("ManeuverGroup") {
@@ -294,9 +340,16 @@ impl<'a> Storyboard<'a> {
             for entity in list.all("EntityRef") {
                 actors.push(self.index(entity, "entityRef")?);
             }
+            self.start(group.id);
             for maneuver in group.all("Maneuver") {
                 self.maneuver(maneuver, &actors)?;
             }
+            if self.have_ended(group.all("Maneuver")) {
+                self.end(group.id);
+            }
+        }
+        if self.have_ended(act.all("ManeuverGroup")) {
+            self.end(act.id);
         }
         Ok(())
     }
@@ -305,15 +358,16 @@ impl<'a> Storyboard<'a> {
     fn stop_act(&mut self, act: &Node) {
         let maneuvers: Vec<&Node> = act.all("ManeuverGroup").flat_map(|group| group.all("Maneuver")).collect();
         self.end_events(|running| maneuvers.iter().any(|maneuver| maneuver.id == running.maneuver));
-        for name in maneuvers.iter().filter_map(|maneuver| maneuver.raw("name")) {
-            self.end(name);
+        for maneuver in maneuvers {
+            self.end_told(maneuver.id, maneuver.raw("name").unwrap_or_default());
+        }
+        for group in act.all("ManeuverGroup") {
+            self.end(group.id);
         }
     }
 
     fn maneuver(&mut self, maneuver: &Node, actors: &[usize]) -> Result<(), ImportError> {
-        let name = maneuver.raw("name").unwrap_or_default().to_owned();
-        self.start(&name);
-        let mut are_done = true;
+        self.start(maneuver.id);
         for event in maneuver.all("Event") {
             let key = event.id;
             let event_name = event.raw("name").unwrap_or_default().to_owned();
@@ -328,15 +382,14 @@ impl<'a> Storyboard<'a> {
                         return Err(self.reader.error(event, message));
                     }
                     self.done.insert(key);
-                    self.start(&event_name);
+                    self.start(event.id);
                     self.events.push((self.time_s, format!("{event_name} begins")));
                     self.begin(event, (&event_name, maneuver.id), actors)?;
                 }
             }
-            are_done &= self.states.get(&event_name).is_some_and(|state| state.ended_s.is_some());
         }
-        if are_done {
-            self.end(&name);
+        if self.have_ended(maneuver.all("Event")) {
+            self.end_told(maneuver.id, maneuver.raw("name").unwrap_or_default());
         }
         Ok(())
     }
@@ -348,16 +401,16 @@ impl<'a> Storyboard<'a> {
         }
         let mut running = RunningEvent {
             name: name.to_owned(),
+            id: event.id,
             maneuver,
             is_longitudinal: Vec::new(),
             is_lateral: Vec::new(),
-            names: Vec::new(),
+            action_ids: Vec::new(),
             actions: Vec::new(),
         };
         for action in event.all("Action") {
-            let action_name = action.raw("name").unwrap_or_default().to_owned();
-            self.start(&action_name);
-            running.names.push(action_name);
+            self.start(action.id);
+            running.action_ids.push(action.id);
             let inner = self.reader.only(action)?;
             if inner.name != "PrivateAction" {
                 return Err(self.reader.error(inner, "only actions of vehicles are read"));
@@ -485,6 +538,11 @@ impl<'a> Storyboard<'a> {
     fn speed_action(&mut self, node: &Node, actor: usize, running: &mut RunningEvent) -> Result<(), ImportError> {
         let dynamics = self.reader.child(node, &["SpeedActionDynamics"])?;
         let (to_mps, stays) = self.target_speed(node)?;
+        if stays.is_some() && dynamics.raw("dynamicsShape") != Some("step") {
+            let message = "`dynamicsShape` must be `step`: a speed that is continuously relative to another vehicle's is \
+                           set at once";
+            return Err(self.reader.error(dynamics, message));
+        }
         let to_mps = self.possible(node, to_mps)?;
         let from_mps = self.vehicles[actor].speed_mps;
         let (duration_s, is_smooth) = self.transition(dynamics, from_mps, to_mps, 0.5 * (from_mps + to_mps))?;
@@ -750,12 +808,10 @@ impl<'a> Storyboard<'a> {
         let (over, running) = std::mem::take(&mut self.running).into_iter().partition(is_over);
         self.running = running;
         for event in over {
-            self.end(&event.name);
+            self.end_told(event.id, &event.name);
             event.actions.iter().for_each(|action| self.cut_short(&event.name, action));
-            for action in event.names {
-                if let Some(state) = self.states.get_mut(&action).filter(|state| state.ended_s.is_none()) {
-                    state.ended_s = Some(self.time_s);
-                }
+            for action in event.action_ids {
+                self.end(action);
             }
         }
     }
@@ -845,14 +901,25 @@ impl<'a> Storyboard<'a> {
                 }
             }
             "ControllerAction" | "ActivateControllerAction" => {
-                if vehicle != self.ego && round == 0 {
-                    let name = &self.vehicles[vehicle].name;
-                    self.notes
-                        .push(format!("line {}: the controller of `{name}`: it drives as the actions say", node.line));
+                if round == 0 {
+                    self.note_controller(node.line, vehicle);
                 }
                 Ok(())
             }
             _ => Err(self.reader.error(node, "this action is not read")),
+        }
+    }
+
+    /// Notes that the controller of a vehicle, named on a line of the file, is left out.
+    pub(super) fn note_controller(&mut self, line: usize, vehicle: usize) {
+        let name = &self.vehicles[vehicle].name;
+        let instead = match vehicle == self.ego {
+            true => "the controller under test drives instead",
+            false => "it drives as the actions say",
+        };
+        let left_out = format!("the controller of `{name}`: {instead}");
+        if !self.notes.iter().any(|note| note.ends_with(&left_out)) {
+            self.notes.push(format!("line {line}: {left_out}"));
         }
     }
 

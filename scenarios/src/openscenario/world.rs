@@ -50,4 +50,13 @@ impl Vehicle {
             true => 0.0,
         }
     }
+
+    /// Returns the distance to a place along the road, positive ahead (m): from the reference point
+    /// or, in free space, from the nearer bumper. A place beside the vehicle has none.
+    pub(super) fn distance_to_m(&self, place_m: f64, is_free_space: bool) -> f64 {
+        match is_free_space {
+            false => place_m - self.s_m,
+            true => place_m - place_m.clamp(self.back_m(), self.front_m()),
+        }
+    }
 }
