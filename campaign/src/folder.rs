@@ -410,6 +410,25 @@ impl Folder {
         Ok(differences)
     }
 
+    /// Returns a message if one of these runs of a sample is not the run of the campaign, to the last
+    /// bit. Of the journal, only the line of this sample is checked.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the journal cannot be read, or the line is damaged.
+    pub fn difference_of_sample(&self, outcomes: &[&Outcome]) -> Result<Option<String>, FolderError> {
+        let Some(first) = outcomes.first() else { return Ok(None) };
+        if !self.has(JOURNAL)? {
+            return Ok(None);
+        }
+        let path = self.file(JOURNAL);
+        let found = journal::find(&path, &first.scenario, first.sample)
+            .map_err(|source| FolderError::Read { path: path.clone(), source })?;
+        let Some((line, record)) = found else { return Ok(None) };
+        let record = record.map_err(|message| FolderError::Content { path, line, message })?;
+        let differing = outcomes.iter().find(|outcome| record.agreement(outcome) == Agreement::Differs);
+        Ok(differing.map(|outcome| difference(outcome)))
+    }
+
     /// Returns the wall time of each sample, in the order of the plan.
     ///
     /// # Errors

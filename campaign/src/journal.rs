@@ -259,6 +259,23 @@ pub(crate) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Re
     Ok(length)
 }
 
+/// Returns the line of a sample, counted from 1, with its record or what is wrong with it. The other
+/// lines are not checked, which would take seconds in a journal of 100,000 samples.
+pub(crate) fn find(path: &Path, scenario: &str, sample: u64) -> io::Result<Option<(usize, Result<Record, String>)>> {
+    let start = format!("{{\"scenario\":{},\"sample\":{sample},", serde_json::Value::from(scenario));
+    let mut reader = BufReader::new(input::open_in_folder(path, OpenOptions::new().read(true))?);
+    let mut line = Vec::new();
+    for number in 1.. {
+        if read_line(&mut reader, &mut line)? == 0 {
+            break;
+        }
+        if line.get(CHECKSUM_DIGITS + 1..).is_some_and(|record| record.starts_with(start.as_bytes())) {
+            return Ok(Some((number, parse(&line))));
+        }
+    }
+    Ok(None)
+}
+
 /// Returns the record of a line, or what is wrong with the line.
 pub(crate) fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
     let Some(line) = line.strip_suffix(b"\n") else { return Err("the line is incomplete".to_owned()) };
@@ -321,6 +338,26 @@ mod tests {
             (complete as u64..3).for_each(|sample| journal.append(&record(sample)).unwrap());
             assert!(std::fs::read(&path).unwrap() == whole, "cut at {cut}");
         }
+    }
+
+    #[test]
+    fn a_sample_is_found_by_its_line_and_a_damaged_line_of_it_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("journal");
+        let quoted = |sample: u64| Record { scenario: "a \"quoted\" name".to_owned(), ..record(sample) };
+        let mut journal = Journal::open(&path, 0).unwrap();
+        [quoted(1), record(12), record(1), quoted(2)].iter().for_each(|record| journal.append(record).unwrap());
+        journal.sync().unwrap();
+        let found = |scenario: &str, sample| find(&path, scenario, sample).unwrap();
+        let (line, one) = found("s", 1).unwrap();
+        assert_eq!((line, one.unwrap().scenario), (3, "s".to_owned()));
+        assert_eq!(found("a \"quoted\" name", 2).unwrap().1.unwrap().sample, 2);
+        assert!(found("s", 2).is_none() && found("t", 1).is_none());
+        let damaged =
+            std::fs::read_to_string(&path).unwrap().replace("\"sample\":12,\"arms\"", "\"sample\":12,\"arm_\"");
+        std::fs::write(&path, damaged).unwrap();
+        assert!(found("s", 12).unwrap().1.unwrap_err().contains("checksum"));
+        assert!(found("s", 1).unwrap().1.is_ok());
     }
 
     #[test]

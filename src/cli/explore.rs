@@ -35,7 +35,6 @@ use super::CliError;
 use super::actions::command_for;
 use super::output::{during, outln, print_error, print_written};
 use super::page_server::{Answer, Method, PageServer};
-use super::saved::difference_from_journal;
 use super::view_error::ViewError;
 use super::viewer::Viewer;
 
@@ -150,7 +149,8 @@ impl Explorer<'_> {
         let (concrete, key) = self.saved.sample(Some(scenario), sample)?;
         let films = film_arms(&concrete, key, &self.saved.arms()?, level)
             .map_err(|source| CliError::Sample { sample, source })?;
-        let difference = difference_from_journal(self.saved, films.iter().filter_map(Film::outcome))?;
+        let outcomes: Vec<_> = films.iter().filter_map(Film::outcome).collect();
+        let difference = self.saved.folder().difference_of_sample(&outcomes)?;
         Ok((films, difference))
     }
 
