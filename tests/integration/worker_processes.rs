@@ -199,7 +199,7 @@ fn a_worker_process_of_another_version_refuses_its_task_and_names_both() {
     let version_line = stdout(&program().arg("--version").output().unwrap(), 0);
     let version = version_line.split_whitespace().nth(1).unwrap().split('+').next().unwrap();
     let message = failure["message"].as_str().unwrap();
-    assert_eq!((failure["kind"].as_str(), answer["is_last"].as_bool()), (Some("refused"), Some(true)));
+    assert_eq!((failure["kind"].as_str(), answer["stage"].as_str()), (Some("refused"), Some("Last")));
     assert!(
         message.starts_with(&format!("Closecall has changed since the start: it was 0.0.1+1a2b, and is {version}")),
         "{message}"
