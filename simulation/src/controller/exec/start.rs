@@ -14,6 +14,9 @@ use rustix::io::Errno;
 /// script (bytes; `BINPRM_BUF_SIZE` of Linux).
 const MOST_BYTES: u64 = 256;
 
+/// Commands that a shell itself carries out.
+const SHELL_COMMANDS: [&str; 6] = ["cd", "export", "exec", "set", "source", "ulimit"];
+
 /// Returns why a program cannot be started, in words, or `None` if the error of the system says it.
 /// `path` is the file of its name.
 pub(super) fn reason(program: &str, path: &Path, error: &io::Error) -> Option<String> {
@@ -21,6 +24,9 @@ pub(super) fn reason(program: &str, path: &Path, error: &io::Error) -> Option<St
     let has_other_format = error.raw_os_error() == Some(Errno::NOEXEC.raw_os_error());
     if error.kind() == ErrorKind::PermissionDenied {
         return denied(path);
+    }
+    if is_absent && !path.is_file() && is_of_a_shell(program) {
+        return Some("no shell reads the command; `sh -c '…'` starts one that does".to_owned());
     }
     if !(is_absent || has_other_format) || !path.is_file() {
         return None;
@@ -40,6 +46,12 @@ pub(super) fn reason(program: &str, path: &Path, error: &io::Error) -> Option<St
                 .to_owned(),
         ),
     }
+}
+
+/// Returns true if the first word of a command has a meaning for a shell alone: `~/mine`,
+/// `$HOME/mine`, `NAME=value`, `cd`.
+fn is_of_a_shell(word: &str) -> bool {
+    word.starts_with('~') || word.contains(['$', '=']) || SHELL_COMMANDS.contains(&word)
 }
 
 /// Returns why a program without a folder is not found, although a file of its name is there.
@@ -83,5 +95,8 @@ mod tests {
         let told = |name: &str| reason(name, Path::new(name), &absent);
         assert!(told("Cargo.toml").is_some_and(|why| why.contains("write `./Cargo.toml`")));
         assert_eq!(told("no-such-file"), None, "the system's words are enough");
+        for word in ["cd", "~/mine.py", "$HOME/mine.py", "PYTHONPATH=."] {
+            assert!(told(word).is_some_and(|why| why.contains("`sh -c '…'` starts one")), "{word}");
+        }
     }
 }
