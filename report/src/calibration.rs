@@ -128,6 +128,11 @@ pub fn json(calibration: &Calibration, data: &FollowingData) -> Value {
     let values = |values: &[f64]| -> Map<String, Value> {
         keys.iter().zip(values).map(|(key, value)| ((*key).to_owned(), json!(value))).collect()
     };
+    let limits: Map<String, Value> = keys
+        .iter()
+        .enumerate()
+        .filter_map(|(index, key)| Some(((*key).to_owned(), json!(at_limits(calibration, index)?))))
+        .collect();
     let pairs: Vec<Value> = calibration
         .pairs
         .iter()
@@ -151,6 +156,7 @@ pub fn json(calibration: &Calibration, data: &FollowingData) -> Value {
         "model": calibration.model.name(),
         "files": files,
         "pooled": values(&calibration.pooled),
+        "at_limits": limits,
         "pairs": pairs,
         "held_out": calibration.held_out,
         "left_out": data.left_out.iter().map(|pair| json!({ "pair": pair.name, "reason": pair.reason })).collect::<Vec<_>>(),
@@ -239,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_at_an_end_of_the_search_is_marked_in_the_text_and_in_the_member() {
+    fn a_value_at_an_end_of_the_search_is_marked_in_every_output() {
         let errors = Errors { pairs: 1, rmse_m: 2.5, relative: 0.15 };
         let pair = |acceleration_mps2| {
             let values = vec![30.0, 1.25, 2.0, acceleration_mps2, 1.8];
@@ -267,5 +273,10 @@ mod tests {
         assert!(member.contains("# at the lower limit 0.1: pooled\n"), "{member}");
         assert_eq!(member.matches("limit of the search").count(), 1, "{member}");
         Member::parse("m.toml".as_ref(), &member).unwrap();
+        let limits = json!({
+            "standstill-gap-m": "at the lower limit 0.1: pooled",
+            "acceleration-mps2": "at the upper limit 6: pooled, 2 of 3 pairs",
+        });
+        assert_eq!(json(&calibration, &data)["at_limits"], limits);
     }
 }
