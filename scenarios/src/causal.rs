@@ -30,12 +30,11 @@ pub struct VehicleLetters {
 }
 
 impl VehicleLetters {
-    /// Returns the letters of a scenario: by convention the first vehicle besides the ego is the
-    /// lead vehicle, and the second the rear vehicle.
+    /// Returns the letters of a scenario, see [`Scenario::lead_and_rear`].
     pub fn of(scenario: &Scenario) -> Self {
-        let mut others = scenario.actors.iter().enumerate().filter(|(index, _)| *index != scenario.ego);
-        let mut next = || others.next().map(|(_, actor)| actor.id.clone());
-        Self { lead: next(), rear: next() }
+        let id = |index: usize| scenario.actors[index].id.clone();
+        let [lead, rear] = scenario.lead_and_rear().map(|index| index.map(id));
+        Self { lead, rear }
     }
 
     /// Returns the letter of a vehicle, or its name if it has none. `ego` is the name of the ego.

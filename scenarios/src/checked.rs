@@ -62,6 +62,24 @@ impl Scenario {
         &self.actors[self.ego].id
     }
 
+    /// Returns the index of the lead vehicle and of the rear vehicle: the nearest vehicles ahead of
+    /// the ego and behind it in its lane at the start or, if none is there, the first one of the
+    /// file on that side.
+    pub fn lead_and_rear(&self) -> [Option<usize>; 2] {
+        let ego = &self.actors[self.ego].start;
+        let lane = self.road.lane_at(ego.d_m);
+        let nearest = |side: f64| {
+            let distances = self.actors.iter().enumerate().map(|(index, actor)| {
+                let is_in_lane = self.road.lane_at(actor.start.d_m) == lane;
+                let distance_m = side * (actor.start.s_m - ego.s_m);
+                (index, distance_m, if is_in_lane { distance_m } else { f64::INFINITY })
+            });
+            let there = distances.filter(|(_, distance_m, _)| *distance_m > 0.0);
+            there.min_by(|one, other| one.2.total_cmp(&other.2)).map(|(index, ..)| index)
+        };
+        [nearest(1.0), nearest(-1.0)]
+    }
+
     /// Returns the look of the actor with this index in a run. If the actor names a fleet, its look
     /// is drawn from the fleet.
     pub fn vehicle(&self, actor: usize, key: RunKey) -> Vehicle {
@@ -505,6 +523,31 @@ mod tests {
         let file = ScenarioFile::parse(Path::new("ramp.toml"), &text, &[]).map_err(|error| error.to_string())?;
         let sample = file.space().sample(Design::Random, 0, 0, 1);
         file.concrete(&sample).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn lead_and_rear_vehicle_are_told_by_their_places_and_not_by_their_order() {
+        let vehicle = |id: &str, lane: u8, s_m: f64| {
+            format!(
+                "[[actor]]\nid = '{id}'\nvehicle = {{ class = 'car' }}\ndriver = {{ idm = {{}} }}\n\
+                 start = {{ absolute = {{ lane = {lane}, s-m = {s_m:.1}, speed-mps = 30.0 }} }}\n"
+            )
+        };
+        let roles = |vehicles: &[String]| {
+            let scenario =
+                scenario(2, "lane = 3, s-m = 560.0, speed-mps = 25.0", "idm = {}", &vehicles.concat()).unwrap();
+            scenario.lead_and_rear().map(|index| index.map(|index| scenario.actors[index].id.to_string()))
+        };
+        let is = |lead: &str, rear: Option<&str>| [Some(lead.to_owned()), rear.map(str::to_owned)];
+        let [beside, rear, second, front] = [
+            vehicle("beside", 1, 490.0),
+            vehicle("rear", 2, 450.0),
+            vehicle("second", 2, 600.0),
+            vehicle("front", 2, 540.0),
+        ];
+        assert_eq!(roles(&[beside.clone(), rear, second, front]), is("front", Some("rear")));
+        assert_eq!(roles(&[beside]), is("ramp", Some("beside")), "the lane of the ego is empty");
+        assert_eq!(roles(&[]), is("ramp", None));
     }
 
     #[test]

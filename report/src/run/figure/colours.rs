@@ -7,9 +7,9 @@ use crate::run::film::{Film, Part};
 
 /// Colour of the ego.
 pub(super) const EGO: &str = "#1a62bb";
-/// Colour of the first of the other actors, by convention the lead vehicle.
+/// Colour of the lead vehicle.
 pub(super) const FRONT: &str = "#9c5700";
-/// Colour of the second of the other actors, by convention the rear vehicle.
+/// Colour of the rear vehicle.
 pub(super) const REAR: &str = "#c2246c";
 /// Colour of all other vehicles.
 const OTHERS: &str = "#5f6772";

@@ -72,6 +72,14 @@ fn in_dense_traffic_all_but_ego_lead_and_rear_vehicle_are_grey_and_share_one_ent
 }
 
 #[test]
+fn in_traffic_without_an_encounter_the_plotted_vehicles_are_the_neighbours_of_the_ego() {
+    let film = &films("traffic/dense-traffic", &[ControllerChoice::ACC])[0];
+    let neighbours = [Part::Lead, Part::Rear].map(|part| film.actors.iter().position(|actor| actor.part == part));
+    assert_eq!(neighbours, [film.frames[0].lead(), film.frames[0].follower()]);
+    assert!(neighbours.iter().flatten().all(|&actor| film.actors[actor].is_plotted), "{neighbours:?}");
+}
+
+#[test]
 fn a_run_without_other_vehicles_nearby_has_a_still_and_a_figure() {
     let films = films("empty-wet-road", &[ControllerChoice::MIS]);
     for text in [still(&films[0]), encounter(&films)] {

@@ -4,7 +4,7 @@
 //! clock, the road and the vehicle indices of the scenario that is made from the encounter, so one
 //! film can be drawn into the other. The frames are one control step of the simulation apart.
 
-use closecall_recorded::encounter::{EGO_INDEX, RecordedEncounter};
+use closecall_recorded::encounter::{EGO_INDEX, LEAD_INDEX, REAR_INDEX, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 
 use super::traffic::{frame_at, present_frames, straight_road};
@@ -25,7 +25,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         name: actor_name(index, track),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
         present_frames: present_frames(track, times()),
-        part: Part::of_index(index, EGO_INDEX),
+        part: Part::of_index(index, EGO_INDEX, [Some(LEAD_INDEX), Some(REAR_INDEX)]),
         is_plotted: true,
     };
     let [ego, _, rear] = encounter.ego_lead_rear();

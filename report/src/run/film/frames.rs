@@ -66,15 +66,12 @@ pub enum Part {
 }
 
 impl Part {
-    /// Returns the part of a simulated vehicle: by convention the first vehicle besides the ego is
-    /// the lead vehicle and the second the rear vehicle.
-    pub(super) fn of_index(index: usize, ego: usize) -> Self {
-        match if index > ego { index - 1 } else { index } {
-            _ if index == ego => Self::Ego,
-            0 => Self::Lead,
-            1 => Self::Rear,
-            other => Self::Other(other - 2),
-        }
+    /// Returns the part of the vehicle with an index, where the ego, the lead vehicle and the rear
+    /// vehicle have these indices.
+    pub(super) fn of_index(index: usize, ego: usize, [lead, rear]: [Option<usize>; 2]) -> Self {
+        let parts = [(Some(ego), Self::Ego), (lead, Self::Lead), (rear, Self::Rear)];
+        let part = |index: usize| parts.iter().find(|(of, _)| *of == Some(index)).map(|(_, part)| *part);
+        part(index).unwrap_or_else(|| Self::Other((0..index).filter(|&before| part(before).is_none()).count()))
     }
 }
 

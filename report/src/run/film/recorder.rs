@@ -65,11 +65,12 @@ impl FilmRecorder {
         };
         let actors = scenario.actors.iter().map(|actor| actor.id.clone()).collect();
         let noise_key = NoiseKey { seed: key.seed, sample: key.sample, ego: scenario.ego_id().clone(), actors };
+        let lead_and_rear = scenario.lead_and_rear();
         let film_actor = |(index, actor): (usize, &closecall_scenarios::Actor)| FilmActor {
             name: actor.id.to_string(),
             vehicle: scenario.vehicle(index, key),
             present_frames: 0..usize::MAX,
-            part: Part::of_index(index, scenario.ego),
+            part: Part::of_index(index, scenario.ego, lead_and_rear),
             is_plotted: true,
         };
         let film = Film {

@@ -12,9 +12,9 @@ pub(super) type Rgba = [u8; 4];
 
 /// The ego.
 pub(super) const EGO: Rgba = [38, 116, 222, 255];
-/// The first of the other actors, by convention the lead vehicle.
+/// The lead vehicle.
 pub(super) const FRONT: Rgba = [190, 98, 0, 255];
-/// The second of the other actors, by convention the rear vehicle.
+/// The rear vehicle.
 pub(super) const REAR: Rgba = [214, 40, 118, 255];
 /// A further relevant vehicle, which has a name: a paler grey than background traffic.
 const OTHER: Rgba = [176, 180, 186, 255];
