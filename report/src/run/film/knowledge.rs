@@ -10,6 +10,10 @@ use super::{Film, Frame};
 /// assumption; 3 to 10 are plausible.
 const SAME_VEHICLE_M: f64 = 5.0;
 
+/// Probability of existence from which on the ego believes in a track: below it, the ego stack acts
+/// as if nothing were there.
+const BELIEVED: f64 = 0.5;
+
 /// The vehicle of a track that belongs to none.
 const NO_VEHICLE: &str = "a vehicle that does not exist";
 
@@ -53,12 +57,15 @@ impl KnownSpan {
     }
 }
 
-/// Returns the confirmed tracks of vehicles behind the ego. A track that has passed the rear bumper
-/// is not behind.
+/// Returns the confirmed tracks of vehicles behind the ego that the ego believes in. A track that has
+/// passed the rear bumper is not behind.
 pub(super) fn rear_seen(tracks: &[Track], vehicles: &[SceneVehicle], ego: usize) -> Vec<RearSeen> {
     let ego_vehicle = &vehicles[ego];
     let is_known = |track: &&Track| {
-        track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
+        track.source == Source::Rear
+            && track.status != TrackStatus::Tentative
+            && track.existence >= BELIEVED
+            && track.class.vehicle() >= 0.5
     };
     let belongs = |track: &Track| {
         let lateral_m = |index: &usize| (vehicles[*index].state.d_m - ego_vehicle.state.d_m - track.y_m()).abs();

@@ -345,15 +345,20 @@ fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
         ),
         (Time::from_s(lane_change.end_s), "the lane change ends".to_owned()),
     ];
-    for (name, metric) in change.metrics.named() {
-        if let MetricResult::Value { value, opponent, time_s, critical } = metric {
-            let against = opponent.map_or(String::new(), |track| format!(" to track {track}"));
-            let (label, unit, limit) = described(name);
-            let mark = if critical { "CRITICAL" } else { "not critical" };
-            notes.push((Time::from_s(time_s), format!("{label} {value:.2} {unit}{against}: {mark} ({limit})")));
-        }
-    }
+    notes.extend(change.metrics.named().into_iter().filter_map(|(name, metric)| note(name, metric)));
     notes
+}
+
+/// Returns the note about a metric, with the time at which it has its value.
+fn note(name: &str, metric: MetricResult) -> Option<(Time, String)> {
+    let MetricResult::Value { value, opponent, time_s, critical } = metric else { return None };
+    let against = opponent.map_or(String::new(), |track| format!(" to track {track}"));
+    let (label, unit, limit) = described(name);
+    let mark = if critical { "CRITICAL" } else { "not critical" };
+    // A vehicle that passes at a safe distance has a short time to closest encounter, too.
+    let is_short = name == "ttce_s" && !critical && value < CRITICAL_TTCE_S;
+    let only = if is_short { ", judged only with the distance" } else { "" };
+    Some((Time::from_s(time_s), format!("{label} {value:.2} {unit}{against}{only}: {mark} ({limit})")))
 }
 
 /// Returns the name of a metric in words, its unit, and its threshold.
@@ -367,5 +372,22 @@ fn described(name: &str) -> (&'static str, &'static str, String) {
         "thw_s" => ("time headway", "s", at(CRITICAL_THW_S, "s")),
         "dce_m" => ("distance at closest encounter", "m", at(CRITICAL_DCE_M, "m")),
         _ => ("time to closest encounter", "s", at(CRITICAL_TTCE_S, "s")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_below_its_threshold_says_why_it_is_not_critical() {
+        let text = |value, critical| {
+            note("ttce_s", MetricResult::Value { value, opponent: Some(26), time_s: 6.0, critical }).unwrap().1
+        };
+        let short = "time to closest encounter 0.01 s to track 26";
+        let limit = "(threshold 2.6 s)";
+        assert_eq!(text(0.01, false), format!("{short}, judged only with the distance: not critical {limit}"));
+        assert_eq!(text(0.01, true), format!("{short}: CRITICAL {limit}"));
+        assert_eq!(text(3.0, false), format!("time to closest encounter 3.00 s to track 26: not critical {limit}"));
     }
 }

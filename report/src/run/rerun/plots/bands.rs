@@ -283,12 +283,13 @@ impl Plots<'_> {
         Ok(())
     }
 
-    /// Writes a band that shows the reason for the state of the ego stack. A controller that never
-    /// changes its reason has none.
+    /// Writes a band that shows the reason for the state of the ego stack. A controller from outside
+    /// gives none.
     fn reasons(&self) -> Result<(), RecordingError> {
         let reason = |frame: &Frame| frame.command.map_or("", |command| command.reason.text());
         let words: Vec<&str> = self.film.frames.iter().map(reason).collect();
-        if changes(&words).len() < 2 || self.film.outcome().is_some_and(|outcome| outcome.mis.is_err()) {
+        let says_nothing = words.iter().all(|&word| word == Reason::External.text());
+        if says_nothing || self.film.outcome().is_some_and(|outcome| outcome.mis.is_err()) {
             return Ok(());
         }
         let colour = |frame: &Frame| match frame.command.map(|command| command.state) {

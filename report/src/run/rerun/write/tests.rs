@@ -2,6 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use arrow::array::AsArray;
 use arrow::datatypes::{Float32Type, Float64Type, UInt16Type, UInt32Type};
+use closecall_controllers::{EgoCommand, Reason};
 use closecall_recorded::encounter::{Lead, encounter};
 use closecall_recorded::filters::smooth;
 use closecall_recorded::lane_change::detect;
@@ -426,6 +427,28 @@ fn a_collision_has_a_line_in_each_plot_a_row_of_states_and_properties() {
     assert!(has("/states/4_collisions/without_MIS") && !has("/states/4_collisions/with_MIS"));
     assert!(has("/states/2_reason/with_MIS") && !has("/states/2_reason/without_MIS"));
     assert!(has("/__properties/arms/acc/collision_1") && !has("/__properties/arms/mis/collision_1"));
+}
+
+#[test]
+fn a_vehicle_is_out_of_sight_while_the_ego_does_not_believe_in_its_track() {
+    let (sampling, key) = (Sampling { seed: 77, design: Design::Random, samples: 24 }, RunKey { seed: 77, sample: 23 });
+    let scenario = concrete(&library("rear-vehicle-is-followed"), sampling, key.sample).unwrap();
+    let arm = Arm { controller: ControllerChoice::MIS.factory(), sensors: None };
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Events);
+    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
+    let film = recorder.finish(&outcome);
+    let (sentence, sight) = (film.sentence().unwrap().to_string(), film.sight().unwrap());
+    assert!(sentence.contains("not sooner: vehicle behind not seen in the lane, 2.9 to 4.6 s"), "{sentence}");
+    assert!(sight.ends_with(" It was lost 2 times, first from 0.72 to 4.56 s."), "{sight}");
+}
+
+#[test]
+fn a_reason_that_holds_from_the_start_to_the_end_has_its_row() {
+    let film = filmed("empty-wet-road", ControllerChoice::MIS, Some(SensorMode::GroundTruth), Level::Events);
+    let has_none_behind = |command: EgoCommand| command.reason == Reason::NoRear;
+    assert!(film.frames.iter().all(|frame| frame.command.is_some_and(has_none_behind)));
+    let data = chunks(&[film], StoreKind::Recording);
+    assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == "/states/2_reason/with_MIS"));
 }
 
 #[test]
