@@ -265,8 +265,8 @@ fn boundary_page(boundary: &Boundary, charts: &Charts) -> Markup {
         @for line in verdict(boundary) { p.failure { (line) } }
         @for (_, svg) in charts { figure.broad tabindex="0" { (PreEscaped(svg)) } }
         p.note {
-            "Orange runs: the event happens; grey runs: it does not; black runs: no value. The line is where a Gaussian process "
-            "puts the boundary. In the grey band the event is not decided with 95 %; in the light orange area it happens."
+            "Orange runs: the event happens; grey runs: it does not; runs in the colour of the text: no value. The line is where a "
+            "Gaussian process puts the boundary. In the grey band the event is not decided with 95 %; in the orange area it happens."
         }
         @if let Some(surveyed) = &boundary.surveyed {
             @for line in statements(surveyed) { p { (line) } }

@@ -58,7 +58,7 @@ fn page(map: &Map) -> Markup {
         p {
             "The margin is the gain of the front time headway from the engagement until the rear vehicle is "
             (map.critical_gap_m) " m behind. The rear vehicle keeps its speed, and all tracks are true. The system engages from a speed "
-            "difference of " (format!("{:.0}", map.engages_from_kmh)) " km/h on. Dark frames: in time in the loop. Bars: the region of the "
+            "difference of " (format!("{:.0}", map.engages_from_kmh)) " km/h on. Thick frames: in time in the loop. Bars: the region of the "
             "paper, in time always below 20 km/h, in 59 % of the cases up to 25 km/h, never above 30 km/h."
         }
         @for &front_thw_s in &map.grid.front_thw_s {

@@ -27,8 +27,9 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
         p.note {
             "The bars show the smallest and the largest rate over equally probable parts of a parameter's distribution, or over its "
             "labels, with 95 % intervals; the line is the rate of all samples. The index is the share of the variance between the parts, "
-            "less the share that chance puts there (first order). Grey: its interval reaches 0. `closecall study sensitivity` runs a design of its "
-            "own for interactions, and for what the scenario does not sample."
+            "less the share that chance puts there (first order). Grey: its interval reaches 0. "
+            code { "closecall study sensitivity" }
+            " runs a design of its own for interactions, and for what the scenario does not sample."
         }
         @for event in &events { (event_influence(event)?) }
     })

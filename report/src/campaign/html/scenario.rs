@@ -116,9 +116,9 @@ fn map(scenario: &ScenarioOverview) -> io::Result<Markup> {
     Ok(html! {
         h3 { "Outcome map" }
         p.note {
-            "Of all pairs of parameters, " (across) " and " (up) " tell the most about the outcome. The darker a cell, the "
-            "larger the share of its samples with a collision in the arm under test. Points are samples, drawn evenly from "
-            "the samples of each colour."
+            "Of all pairs of parameters, " (across) " and " (up) " tell the most about the outcome. The stronger the colour "
+            "of a cell, the larger the share of its samples with a collision in the arm under test. Points are samples, drawn "
+            "evenly from the samples of each colour."
         }
         (fate_legend(scenario))
         p.legend {
