@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use std::ffi::CStr;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, StringArray};
+use arrow::array::{
+    ArrayRef, BooleanArray, Float64Array, Int64Array, NullArray, RecordBatch, RecordBatchIterator, StringArray,
+};
 use arrow::datatypes::{Schema, SchemaRef};
 use arrow::error::ArrowError;
 use arrow::ffi::FFI_ArrowSchema;
@@ -85,7 +87,8 @@ impl Table {
 }
 
 /// Returns the table of a JSON array of objects. A column has the type of its values: truth values, whole numbers, numbers or
-/// text. Values of several types, and lists, become JSON text.
+/// text. Values of several types, and lists, become JSON text. A column without a value has Arrow's type null, which every
+/// other one takes in if tables are joined.
 #[pyfunction]
 pub(crate) fn rows_table(rows: &str) -> PyResult<Table> {
     let rows: Vec<Map<String, Value>> =
@@ -112,7 +115,9 @@ pub(crate) fn rows_table(rows: &str) -> PyResult<Table> {
 /// Returns the column of these values. `None` is absent.
 fn column(values: &[Option<&Value>]) -> ArrayRef {
     let are = |is: fn(&Value) -> bool| values.iter().flatten().all(|value| is(value));
-    if are(Value::is_boolean) {
+    if values.iter().all(Option::is_none) {
+        Arc::new(NullArray::new(values.len()))
+    } else if are(Value::is_boolean) {
         Arc::new(values.iter().map(|value| value.and_then(Value::as_bool)).collect::<BooleanArray>())
     } else if are(Value::is_i64) {
         Arc::new(values.iter().map(|value| value.and_then(Value::as_i64)).collect::<Int64Array>())

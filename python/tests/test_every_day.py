@@ -77,6 +77,9 @@ def test_lane_changes_and_criticality_are_tables(tmp_path: Path) -> None:
     assert metrics.column("track_id").to_pylist() == [row["track_id"] for row in flat]
     nested = pyarrow.table(cc.Rows([{"metrics": {"thw_s": 0.5}}, {"metrics": {"thw_s": None}}]).table())
     assert nested.column("metrics.thw_s").to_pylist() == [0.5, None]
+    empty = pyarrow.table(cc.Rows([{"metrics": {"thw_s": None}}]).table())
+    assert empty.schema.field("metrics.thw_s").type == pyarrow.null()
+    assert pyarrow.concat_tables([empty, nested], promote_options="default").column(0).to_pylist() == [None, 0.5, None]
     assert len(cc.Rows().table()) == 0
 
 
