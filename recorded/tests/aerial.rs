@@ -2,9 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
+use std::collections::BTreeSet;
+
 use closecall_recorded::aerial::dataset::{AerialDatasetOptions, dataset_picture};
 use closecall_recorded::aerial::{Boxes, Correction, Detector, FlightOptions, fly, intersection_over_union, losses};
-use closecall_recorded::trajectory_data::TrajectoryData;
+use closecall_recorded::trajectory_data::{LaneMarkings, TrajectoryData};
 use closecall_sensors::camera::Backend;
 use closecall_sensors::datasets::Set;
 use closecall_traffic::geometry::OrientedBox;
@@ -114,6 +116,38 @@ fn a_flight_follows_all_vehicles_and_the_correction_removes_the_bias_of_trucks()
     assert!(corrected.abs() < 0.5 * raw, "{corrected} of {raw}");
     let text = result.to_string();
     assert!(["truck corrected", "thw_s", "ID switches"].iter().all(|words| text.contains(words)), "{text}");
+}
+
+#[test]
+fn each_carriageway_is_flown_over_by_itself() {
+    let tracks = |first_id: u64, moved_m: f64, lanes: u8| {
+        let car = vehicle(first_id, VehicleClass::Car, 0.0, 28.0, true);
+        let lead = vehicle(first_id + 1, VehicleClass::Car, 40.0, 26.0, false);
+        [car, lead].map(|mut track| {
+            for point in &mut track.points {
+                point.d_m -= moved_m;
+                point.lane.0 += lanes;
+            }
+            track
+        })
+    };
+    let both = [tracks(1, 0.0, 0), tracks(3, 1_007.0, 3)].concat();
+    let edges = [-3.5, -7.0, -1_007.0, -1_010.5, -1_014.0];
+    let markings = LaneMarkings::from_right_edges((1..).map(Lane).zip(edges));
+    let data = TrajectoryData { markings, ..TrajectoryData::new("two", Time::from_ms(100), both) };
+    let options = FlightOptions { boxes: Boxes::Exact, offset_sigma_m: 0.0, ..FlightOptions::default() };
+    let flight = fly(&data, &options, &Backend::Tract).unwrap();
+    let losses = losses(std::slice::from_ref(&flight));
+    let row = &losses.rows[1];
+    assert!(row.followed.unwrap() > 0.9 && row.bias_across_m.unwrap().abs() < 0.3, "{row:?}");
+    let peak = row.lane_changes[0];
+    assert_eq!((peak.wanted, peak.found, peak.invented), (2, 2, 0), "{row:?}");
+    let lanes: BTreeSet<u8> =
+        flight.corrected.trajectories.iter().flat_map(|track| &track.points).map(|point| point.lane.0).collect();
+    assert_eq!(lanes, BTreeSet::from([1, 2, 4, 5]));
+    // Vehicles that drive beside all lanes are in no picture.
+    let far = TrajectoryData::new("far", Time::from_ms(100), tracks(1, 200.0, 0).to_vec());
+    assert!(fly(&far, &options, &Backend::Tract).unwrap_err().to_string().contains("no vehicle is within a picture"));
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! A flight over traffic: pictures of each instant, detections, and trajectory data from them.
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::filters::{PERIOD, smooth};
 use crate::lane_change::detect;
-use crate::trajectory_data::TrajectoryData;
+use crate::trajectory_data::{Carriageways, TrajectoryData};
 use closecall_sensors::camera::Backend;
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{
@@ -140,11 +141,11 @@ pub struct Flight {
     pub example: AerialPicture,
 }
 
-/// Watches the traffic of `data` with a camera that follows it.
+/// Watches the traffic of `data` with a camera that follows it, on each carriageway by itself.
 ///
 /// # Errors
-/// [`AerialError`] if an option is out of range, if there is no lane change to watch, or if the
-/// detector fails.
+/// [`AerialError`] if an option is out of range, if there is no lane change to watch, if no vehicle is within a
+/// picture, or if the detector fails.
 pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) -> Result<Flight, AerialError> {
     fly_watched(data, options, backend, &|_| {})
 }
@@ -161,29 +162,34 @@ pub fn fly_watched(
 ) -> Result<Flight, AerialError> {
     options.check()?;
     let period = options.footage.period();
-    let edges_m = edges_m(data);
-    let spans = spans(data, options)?;
-    let frames: usize = spans.iter().map(Vec::len).sum();
+    let roads = roads(data, options);
+    let frames: usize = roads.iter().flat_map(|road| &road.spans).map(Vec::len).sum();
     let searched = AtomicU64::new(0);
     let on_picture = || progress([searched.fetch_add(1, Ordering::Relaxed) + 1, frames as u64]);
     let errors = georeferencing(options, frames)?;
     let mut errors = errors.as_slice();
     let (mut truth, mut seen, mut flat) = (Vec::new(), Vec::new(), Vec::new());
     let mut example = None;
-    for times in &spans {
-        let scenes: Vec<AerialScene> = times.iter().map(|time| scene_at(data, &edges_m, *time, options)).collect();
-        let cameras: Vec<AerialCamera> = scenes.iter().map(|scene| camera_above(scene, &edges_m, options)).collect();
+    for (road, times) in roads.iter().flat_map(|road| road.spans.iter().map(move |times| (road, times))) {
+        let Road { data, edges, .. } = road;
+        let edges_m = &edges.edges_m;
+        let scenes: Vec<AerialScene> = times.iter().map(|time| scene_at(data, edges_m, *time, options)).collect();
+        let cameras: Vec<AerialCamera> = scenes.iter().map(|scene| camera_above(scene, edges_m, options)).collect();
         let [raw, corrected] = detections((&scenes, &cameras), options, backend, &on_picture)?;
         let (span_errors, rest) = errors.split_at(times.len());
         errors = rest;
         for (frames, all) in [(raw, &mut seen), (corrected, &mut flat)] {
             let tracks = track(&shifted(frames, span_errors), period.s());
             let first_id = all.iter().map(|track: &Trajectory| track.track_id).max().unwrap_or(0);
-            all.extend(tracks.iter().map(|track| trajectory(track, first_id, [times[0], period], &edges_m)));
+            all.extend(tracks.iter().map(|track| trajectory(track, first_id, [times[0], period], edges)));
         }
         truth.extend(watched(data, times, &cameras));
         let middle = times.len() / 2;
         example.get_or_insert_with(|| options.footage.picture(&scenes[middle], &cameras[middle]));
+    }
+    let Some(example) = example else { return Err(refused(data, "no vehicle changes lanes")) };
+    if truth.is_empty() {
+        return Err(refused(data, "no vehicle is within a picture: the lateral positions count from elsewhere"));
     }
     for (index, track) in truth.iter_mut().enumerate() {
         track.track_id = index as u64 + 1;
@@ -192,7 +198,6 @@ pub fn fly_watched(
         markings: data.markings.clone(),
         ..TrajectoryData::new(&format!("{}-{name}", data.name), period, all)
     };
-    let Some(example) = example else { return Err(nothing(data)) };
     let (raw, corrected) = (named("aerial-raw", seen), named("aerial-corrected", flat));
     Ok(Flight { truth: named("truth", truth), raw, corrected, frames, example })
 }
@@ -266,14 +271,47 @@ fn footprint(camera: &AerialCamera, seen: &OrientedBox, class: VehicleClass, opt
     }
 }
 
+/// A carriageway, over which the camera flies by itself.
+struct Road<'d> {
+    /// The vehicles on it.
+    data: Cow<'d, TrajectoryData>,
+    edges: RoadEdges,
+    /// The instants of the pictures, in spans without gaps.
+    spans: Vec<Vec<Time>>,
+}
+
+/// The markings of a carriageway.
+struct RoadEdges {
+    /// Number of lanes to the left of the carriageway, with the unused one.
+    lanes_before: u8,
+    /// Positions of the markings of all lanes that have traffic (m), from the left edge on.
+    edges_m: Vec<f64>,
+}
+
+/// Returns the carriageways of the traffic, which may be far apart: no picture shows two of them.
+fn roads<'d>(data: &'d TrajectoryData, options: &FlightOptions) -> Vec<Road<'d>> {
+    let carriageways = Carriageways::of(data.trajectories.iter());
+    let road = |number: usize| {
+        let mut part = Cow::Borrowed(data);
+        if carriageways.count() > 1 {
+            let is_on_it =
+                |track: &Trajectory| track.points.first().is_some_and(|at| carriageways.at(at.d_m) == number);
+            part.to_mut().trajectories.retain(is_on_it);
+        }
+        let (edges, spans) = (RoadEdges::of(&part, number), spans(&part, options));
+        Road { data: part, edges, spans }
+    };
+    (0..carriageways.count()).map(road).collect()
+}
+
 /// Returns the instants of the pictures, all of them multiples of the time between two pictures:
 /// those near a lane change, in spans without gaps.
-fn spans(data: &TrajectoryData, options: &FlightOptions) -> Result<Vec<Vec<Time>>, AerialError> {
+fn spans(data: &TrajectoryData, options: &FlightOptions) -> Vec<Vec<Time>> {
     let mut crossings: Vec<Time> = detect(&smooth(data)).iter().map(|change| Time::from_s(change.crossing_s)).collect();
     crossings.sort();
     let reach = Time::from_s(options.reach_s);
     let recorded = data.trajectories.iter().filter_map(Trajectory::span).reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
-    let Some((first, last)) = recorded.filter(|_| !crossings.is_empty()) else { return Err(nothing(data)) };
+    let Some((first, last)) = recorded.filter(|_| !crossings.is_empty()) else { return Vec::new() };
     let mut spans: Vec<Vec<Time>> = Vec::new();
     let period = options.footage.period();
     for tick in (first.ns() + period.ns() - 1).div_euclid(period.ns())..=last.ns().div_euclid(period.ns()) {
@@ -286,11 +324,11 @@ fn spans(data: &TrajectoryData, options: &FlightOptions) -> Result<Vec<Vec<Time>
             _ => spans.push(vec![time]),
         }
     }
-    Ok(spans)
+    spans
 }
 
-fn nothing(data: &TrajectoryData) -> AerialError {
-    AerialError::Traffic { name: data.name.clone(), reason: "no vehicle changes lanes".to_owned() }
+fn refused(data: &TrajectoryData, reason: &str) -> AerialError {
+    AerialError::Traffic { name: data.name.clone(), reason: reason.to_owned() }
 }
 
 /// Returns the state of a vehicle between two recorded instants; `None` outside of its track.
@@ -329,18 +367,25 @@ fn scene_at(data: &TrajectoryData, edges_m: &[f64], time: Time, options: &Flight
     AerialScene { ground, vehicles: vehicles.collect(), light: Light::NOON, key }
 }
 
-/// Returns the positions of the markings of all lanes that have traffic (m), from the left edge of
-/// the road on.
-fn edges_m(data: &TrajectoryData) -> Vec<f64> {
-    let width_m = data.markings.typical_lane_width_m();
-    let lanes = data.trajectories.iter().flat_map(|track| &track.points).map(|point| point.lane.0).max();
-    let mut edges_m = vec![0.0];
-    for lane in 1..=lanes.unwrap_or(1).clamp(2, MOST_LANES) {
-        let last_m = edges_m[edges_m.len() - 1];
-        let known_m = data.markings.right_edge_m(Lane(lane)).filter(|edge_m| *edge_m < last_m);
-        edges_m.push(known_m.unwrap_or(last_m - width_m));
+impl RoadEdges {
+    /// Returns the markings of the carriageway with this number, counted from the left, whose traffic is `data`.
+    fn of(data: &TrajectoryData, number: usize) -> Self {
+        let width_m = data.markings.typical_lane_width_m();
+        let lanes = || data.trajectories.iter().flat_map(|track| &track.points).map(|point| point.lane.0);
+        let first = if number == 0 { 1 } else { lanes().min().unwrap_or(1).max(1) };
+        let lanes_before = first - 1;
+        let left_m = data.markings.left_edge_m(Lane(first)).or_else(|| {
+            let right_m = data.markings.right_edge_m(Lane(first))?;
+            Some(right_m + width_m)
+        });
+        let mut edges_m = vec![left_m.unwrap_or(0.0)];
+        for lane in 1..=lanes().max().unwrap_or(1).saturating_sub(lanes_before).clamp(2, MOST_LANES) {
+            let last_m = edges_m[edges_m.len() - 1];
+            let edge_m = data.markings.right_edge_m(Lane(lanes_before.saturating_add(lane)));
+            edges_m.push(edge_m.filter(|edge_m| *edge_m < last_m).unwrap_or(last_m - width_m));
+        }
+        Self { lanes_before, edges_m }
     }
-    edges_m
 }
 
 /// Returns the body of a vehicle: a shape of its class that suits its length, with its own paint.
@@ -396,16 +441,17 @@ fn shifted(mut frames: Vec<Vec<GroundDetection>>, errors_m: &[[f64; 2]]) -> Vec<
 
 /// Returns the trajectory of a track, whose number counts on after those `before`, from the time of
 /// the first picture and the time between two; lanes are those between the known markings.
-fn trajectory(track: &AerialTrack, before: u64, [start, period]: [Time; 2], edges_m: &[f64]) -> Trajectory {
+fn trajectory(track: &AerialTrack, before: u64, [start, period]: [Time; 2], edges: &RoadEdges) -> Trajectory {
+    let RoadEdges { lanes_before, edges_m } = edges;
     let lane_at = |d_m: f64| {
         let passed = edges_m[1..edges_m.len() - 1].iter().filter(|edge_m| d_m < **edge_m).count();
-        Lane(u8::try_from(passed + 1).unwrap_or(u8::MAX))
+        Lane(u8::try_from(passed + 1).unwrap_or(u8::MAX).saturating_add(*lanes_before))
     };
     let point = |point: &crate::aerial::tracker::TrackPoint| TrajectoryPoint {
         time: start + period * point.frame as i64,
         s_m: point.at_m[0],
         // Positions to the left of the road are not part of a lane.
-        d_m: point.at_m[1].min(0.0),
+        d_m: point.at_m[1].min(edges_m[0]),
         speed_mps: point.speed_mps[0].max(0.0),
         acceleration_mps2: point.acceleration_mps2[0],
         lateral_speed_mps: point.speed_mps[1],

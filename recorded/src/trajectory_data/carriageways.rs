@@ -34,8 +34,17 @@ impl Carriageways {
 
     /// Returns true if two lateral positions are on one carriageway.
     pub(crate) fn share(&self, a_m: f64, b_m: f64) -> bool {
-        let passed = |d_m: f64| self.medians_m.partition_point(|median_m| *median_m < d_m);
-        passed(a_m) == passed(b_m)
+        self.at(a_m) == self.at(b_m)
+    }
+
+    /// Returns the number of the carriageway at a lateral position, counted from the left, from 0 on.
+    pub(crate) fn at(&self, d_m: f64) -> usize {
+        self.medians_m.len() - self.medians_m.partition_point(|median_m| *median_m < d_m)
+    }
+
+    /// Returns the number of carriageways.
+    pub(crate) fn count(&self) -> usize {
+        self.medians_m.len() + 1
     }
 }
 
@@ -50,5 +59,6 @@ mod tests {
         let carriageways = Carriageways::of(tracks.iter());
         assert!(carriageways.share(-1.75, -8.75) && carriageways.share(-40.0, -43.5));
         assert!(!carriageways.share(-8.75, -40.0) && !carriageways.share(-1.75, -43.5));
+        assert_eq!((carriageways.count(), carriageways.at(-1.75), carriageways.at(-43.5)), (2, 0, 1));
     }
 }
