@@ -370,7 +370,7 @@ pub enum TrajectoryFileProblem {
         place: String,
     },
     /// The road cannot be derived from the traffic, because no vehicle moves.
-    #[error("no vehicle moves, so that the road cannot be told from the traffic")]
+    #[error("no vehicle moves, so that the road cannot be told from the traffic: are times or speeds missing, or in another unit?")]
     NothingMoves,
     /// A folder contains several data sets.
     #[error(

@@ -367,17 +367,18 @@ impl Motion {
         speed_mps
     }
 
-    /// Checks the axes of the velocities. Other axes are a reason why speeds contradict the positions, too.
+    /// Checks the axes of the headings and the velocities. Other axes are a reason why speeds contradict the positions,
+    /// and why vehicles seem to leave the road of the map, too.
     ///
     /// # Errors
-    /// The velocities contradict the movements, and the headings do not.
+    /// The headings contradict the movements, or the velocities alone do.
     fn check_velocities(&self) -> Result<(), ReadError> {
         match (self.velocities.contradicted_percent(), self.headings.contradicted_percent()) {
-            (Some(percent), None) => {
-                Err(ReadError::of_file(TrajectoryFileProblem::VelocitiesAgainstMotion { percent }))
-            }
-            _ => Ok(()),
+            (Some(percent), None) => Err(TrajectoryFileProblem::VelocitiesAgainstMotion { percent }),
+            (_, Some(_)) => self.headings.check(Layout::Osi),
+            (None, None) => Ok(()),
         }
+        .map_err(ReadError::of_file)
     }
 }
 
