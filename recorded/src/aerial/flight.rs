@@ -144,8 +144,8 @@ pub struct Flight {
 /// Watches the traffic of `data` with a camera that follows it, on each carriageway by itself.
 ///
 /// # Errors
-/// [`AerialError`] if an option is out of range, if there is no lane change to watch, if no vehicle is within a
-/// picture, or if the detector fails.
+/// [`AerialError`] if an option is out of range, if there is no lane change to watch, if no vehicle
+/// is within a picture, or if the detector fails.
 pub fn fly(data: &TrajectoryData, options: &FlightOptions, backend: &Backend) -> Result<Flight, AerialError> {
     fly_watched(data, options, backend, &|_| {})
 }
@@ -368,7 +368,8 @@ fn scene_at(data: &TrajectoryData, edges_m: &[f64], time: Time, options: &Flight
 }
 
 impl RoadEdges {
-    /// Returns the markings of the carriageway with this number, counted from the left, whose traffic is `data`.
+    /// Returns the markings of the carriageway with this number, counted from the left, whose traffic
+    /// is `data`.
     fn of(data: &TrajectoryData, number: usize) -> Self {
         let width_m = data.markings.typical_lane_width_m();
         let lanes = || data.trajectories.iter().flat_map(|track| &track.points).map(|point| point.lane.0);

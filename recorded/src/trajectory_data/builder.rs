@@ -199,7 +199,8 @@ impl TrackBuilder {
             self.continuity.edge_crossings += u64::from(cut.start);
         }
         self.continuity.edge_crossings += u64::from(cut.end);
-        // A vehicle has a further number on each further road, which the pieces on the roads before may have taken.
+        // A vehicle has a further number on each further road, which the pieces on the roads before
+        // may have taken.
         let offset = first.number.saturating_sub(first.vehicle_id);
         let roads_before = if offset.is_multiple_of(PIECE_STRIDE) { offset / PIECE_STRIDE } else { 0 };
         let own_number = first.number - roads_before * PIECE_STRIDE;

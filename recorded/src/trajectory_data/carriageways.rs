@@ -37,7 +37,8 @@ impl Carriageways {
         self.at(a_m) == self.at(b_m)
     }
 
-    /// Returns the number of the carriageway at a lateral position, counted from the left, from 0 on.
+    /// Returns the number of the carriageway at a lateral position, counted from the left, from 0
+    /// on.
     pub(crate) fn at(&self, d_m: f64) -> usize {
         self.medians_m.len() - self.medians_m.partition_point(|median_m| *median_m < d_m)
     }

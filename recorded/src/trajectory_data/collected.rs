@@ -115,7 +115,8 @@ impl CollectedRow {
         PlaneMoment { vehicle, time, point, heading_rad, speed_mps, clock }
     }
 
-    /// Returns `true` if the file states the same in both rows. `changes_lane` depends on the row before.
+    /// Returns `true` if the file states the same in both rows. `changes_lane` depends on the row
+    /// before.
     fn repeats(&self, other: &Self) -> bool {
         let stated = |row: &Self| {
             let mut row = Self { line: 0, ..*row };

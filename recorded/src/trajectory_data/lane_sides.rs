@@ -26,8 +26,8 @@ const BESIDE_M: f64 = 30.0;
 const ENOUGH: usize = 20_000;
 /// Number of later vehicles of the same instant with which a vehicle is compared.
 const COMPARED: usize = 8;
-/// Largest number of rows that are held. Beyond it, the earliest instant is left out: rows in the order of time need
-/// one instant, and rows in the order of vehicles need all.
+/// Largest number of rows that are held. Beyond it, the earliest instant is left out: rows in the
+/// order of time need one instant, and rows in the order of vehicles need all.
 const MOST_HELD: usize = 1 << 18;
 
 /// Least number of comparisons, and of pairs of vehicles, that contradict the count of the lanes.

@@ -367,8 +367,8 @@ impl Motion {
         speed_mps
     }
 
-    /// Checks the axes of the headings and the velocities. Other axes are a reason why speeds contradict the positions,
-    /// and why vehicles seem to leave the road of the map, too.
+    /// Checks the axes of the headings and the velocities. Other axes are a reason why speeds
+    /// contradict the positions, and why vehicles seem to leave the road of the map, too.
     ///
     /// # Errors
     /// The headings contradict the movements, or the velocities alone do.
