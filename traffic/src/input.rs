@@ -3,6 +3,7 @@
 //! | at the path is | an input | a file of a campaign's folder |
 //! |---|---|---|
 //! | a file | opened | opened |
+//! | a folder | refused: a file is needed | refused |
 //! | a symbolic link | followed | refused: it may lead to a file that the campaign would overwrite |
 //! | a named pipe, a socket, a device | refused: it may never end, or never begin | refused |
 //! | `/dev/stdin`, `/dev/fd/N`, `/dev/null` | opened | refused |
@@ -24,8 +25,8 @@ const BYTE_ORDER_MARK: char = '\u{feff}';
 /// Opens an input for reading.
 ///
 /// # Errors
-/// The error of the system, or [`ErrorKind::InvalidInput`] if the path leads to something that is
-/// neither a file nor a folder.
+/// The error of the system, [`ErrorKind::IsADirectory`] for a folder, or
+/// [`ErrorKind::InvalidInput`] if the path leads to something else that is no file.
 pub fn open(path: &Path) -> io::Result<File> {
     let is_stream = cfg!(unix) && ["/dev/stdin", "/dev/fd", "/dev/null", "/proc"].iter().any(|at| path.starts_with(at));
     let opened = if is_stream { File::open(path) } else { checked(path, OpenOptions::new().read(true), false) };
@@ -117,17 +118,25 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
     let file = match options.custom_flags(flags).open(path) {
         Ok(file) => file,
         Err(_) if is_in_folder && path.is_symlink() => return Err(refused("a symbolic link")),
+        Err(error) if error.kind() == ErrorKind::IsADirectory => return Err(folder()),
         // A named pipe that is opened for writing, or a socket.
         Err(error) => return Err(special_kind(path).map_or(error, refused)),
     };
     let kind = file.metadata()?.file_type();
-    if kind.is_fifo() {
+    if kind.is_dir() {
+        Err(folder())
+    } else if kind.is_fifo() {
         Err(refused("a named pipe"))
     } else if kind.is_char_device() || kind.is_block_device() {
         Err(refused("a device"))
     } else {
         Ok(file)
     }
+}
+
+/// Returns the error of a path that leads to a folder.
+fn folder() -> io::Error {
+    io::Error::new(ErrorKind::IsADirectory, "it is a folder, and a file is needed")
 }
 
 /// Returns the kind of thing at a path that cannot be opened, if it is neither a file nor a folder.
@@ -144,7 +153,7 @@ fn checked(path: &Path, options: &mut OpenOptions, is_in_folder: bool) -> io::Re
     if is_in_folder && path.is_symlink() {
         return Err(io::Error::new(ErrorKind::InvalidInput, "it is a symbolic link, not a file"));
     }
-    options.open(path)
+    if path.is_dir() { Err(folder()) } else { options.open(path) }
 }
 
 #[cfg(test)]
@@ -184,7 +193,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_a_socket_and_a_device_are_refused_and_a_link_in_a_folder_too() {
+    fn a_folder_a_pipe_a_socket_and_a_device_are_refused_and_a_link_in_a_folder_too() {
         let folder = tempfile::tempdir().unwrap();
         let [pipe, socket, link, victim] = ["pipe", "socket", "link", "victim"].map(|name| folder.path().join(name));
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
@@ -195,6 +204,10 @@ mod tests {
         for path in [pipe.as_path(), &socket, Path::new("/dev/zero")] {
             assert_eq!(open(path).unwrap_err().kind(), ErrorKind::InvalidInput, "{}", path.display());
             assert_eq!(in_folder(path).unwrap_err().kind(), ErrorKind::InvalidInput, "{}", path.display());
+        }
+        for error in [open(folder.path()).unwrap_err(), in_folder(folder.path()).unwrap_err()] {
+            assert_eq!(error.kind(), ErrorKind::IsADirectory);
+            assert_eq!(error.to_string(), "it is a folder, and a file is needed");
         }
         assert!(in_folder(&link).unwrap_err().to_string().contains("symbolic link"));
         assert_eq!(read_text(&link).unwrap(), "kept");
