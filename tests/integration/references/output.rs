@@ -205,7 +205,7 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let bad = "exec:sh tests/fixtures/controllers/bad.sh dies";
     program(&["campaign", headline, "-n", "5", "--controller", bad, "--sensors", "full", "--out", &at("exec")], 5);
     let ends = ["campaign", headline, "-n", "5", "--fail-fast", "--controller", bad, "--sensors", "object"];
-    let ended = [&["--no-out"][..], &["--out", &at("ended")]].map(|more| program(&[&ends[..], more].concat(), 5));
+    let ended = [&[][..], &["--out", &at("ended")]].map(|more| program(&[&ends[..], more].concat(), 5));
     hold("ended-early", &ended);
     program(&["campaign", headline, "-n", "60", "--partition", "1/2", "--no-gate", "--out", &at("part")], 0);
     let journals = ["open", "exec"].map(|name| lines(&folder.path().join(name).join("journal.jsonl"), true));
