@@ -53,5 +53,5 @@ for message in map(json.loads, sys.stdin):
         step, before = 0.0 if before is None else 1e-9 * (now - before), now
         comfort = limit_jerk(cruise(v, hello["road"]["speed_limit_mps"], front, settings["acc"]), comfort, v, step)
         a = min(comfort, -braked if braked else math.inf)
-        answer = {"acceleration_mps2": a, "state": "emergency-braking" if braked else "following"}
+        answer = {"acceleration_mps2": a, "state": "emergency-braking" if braked else "following", "time_ns": now}
     print(json.dumps(answer), flush=True)

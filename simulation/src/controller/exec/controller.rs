@@ -95,6 +95,7 @@ impl ControllerFactory for ExecFactory {
             name: self.name.clone(),
             ego_settings: *settings,
             repeats_time: self.repeats_time,
+            was_repeated: false,
             lead_selector: LeadVehicleSelector::default(),
             child: None,
         })
@@ -109,6 +110,8 @@ struct ExecController {
     name: String,
     ego_settings: EgoSettings,
     repeats_time: bool,
+    /// Whether an answer has repeated the time of its control step.
+    was_repeated: bool,
     lead_selector: LeadVehicleSelector,
     child: Option<Child>,
 }
@@ -134,11 +137,13 @@ impl ExecController {
         let asked = protocol::Asked {
             time_ns: input.time.ns(),
             must_be_repeated: self.repeats_time,
+            was_repeated: self.was_repeated,
             answered: child.answered(),
         };
         let answer = protocol::parse_answer(&line, asked);
-        if answer.is_err() {
-            child.condemn();
+        match &answer {
+            Ok(answer) => self.was_repeated |= answer.repeats_time,
+            Err(_) => child.condemn(),
         }
         answer
     }

@@ -57,6 +57,8 @@ pub(crate) fn to_line(message: &impl Serialize) -> Vec<u8> {
 pub(super) struct Answer {
     pub(super) acceleration_mps2: f64,
     pub(super) state: EgoState,
+    /// Whether the answer repeats the time of its control step.
+    pub(super) repeats_time: bool,
 }
 
 /// Checks the answer to the first message, and returns what the process states about itself.
@@ -87,6 +89,8 @@ pub(super) struct Asked {
     pub(super) time_ns: i64,
     /// Whether the answer must repeat the time. Else it may.
     pub(super) must_be_repeated: bool,
+    /// Whether an earlier answer has repeated its time: then this one must, too.
+    pub(super) was_repeated: bool,
     /// Number of answers before, including the greeting.
     pub(super) answered: u64,
 }
@@ -103,7 +107,8 @@ pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecErro
     if repeated.is_some_and(|time| time.as_i64().is_none()) {
         return Err(key_error(line, &object, TIME_KEY, "a whole number, the `time_ns` of the step"));
     }
-    let is_own = repeated.map_or(!asked.must_be_repeated, |time| time.as_i64() == Some(asked.time_ns));
+    let must_be_repeated = asked.must_be_repeated || asked.was_repeated;
+    let is_own = repeated.map_or(!must_be_repeated, |time| time.as_i64() == Some(asked.time_ns));
     if !is_own {
         let repeated_time = repeated.map_or_else(|| "an unstated number of".to_owned(), ToString::to_string);
         let (line, repeated_time) = (excerpt(line), excerpt(repeated_time.as_bytes()));
@@ -122,7 +127,7 @@ pub(super) fn parse_answer(line: &[u8], asked: Asked) -> Result<Answer, ExecErro
         let states = "one of following, increasing, holding, releasing, emergency-braking";
         key_error(line, &object, STATE_KEY, states)
     })?;
-    Ok(Answer { acceleration_mps2, state })
+    Ok(Answer { acceleration_mps2, state, repeats_time: repeated.is_some() })
 }
 
 /// Returns why the process of a library or an FMU has not ended its run as it should, if it says so.
@@ -184,7 +189,8 @@ mod tests {
     use super::*;
 
     fn parsed(line: &[u8]) -> Result<Answer, ExecError> {
-        parse_answer(line, Asked { time_ns: 80_000_000, must_be_repeated: false, answered: 3 })
+        let asked = Asked { time_ns: 80_000_000, must_be_repeated: false, was_repeated: false, answered: 3 };
+        parse_answer(line, asked)
     }
 
     #[test]
@@ -200,7 +206,11 @@ mod tests {
             let expected = "`time_ns` must be a whole number, the `time_ns` of the step, it is ";
             assert!(error.contains(expected), "{wrong}: {error}");
         }
-        let asked = Asked { time_ns: 80_000_000, must_be_repeated: true, answered: 3 };
+        let asked = Asked { time_ns: 80_000_000, must_be_repeated: true, was_repeated: false, answered: 3 };
+        // A process that has repeated the time does so in each answer.
+        let later = Asked { must_be_repeated: false, was_repeated: true, ..asked };
+        assert!(parse_answer(line(",\"time_ns\":80000000").as_bytes(), later).unwrap().repeats_time);
+        assert!(matches!(parse_answer(line("").as_bytes(), later), Err(ExecError::OtherStep { .. })));
         assert!(matches!(parse_answer(line("").as_bytes(), asked), Err(ExecError::OtherStep { .. })));
         let failed = br#"{"time_ns":80000000,"error":"no map"}"#;
         assert!(matches!(parse_answer(failed, asked), Err(ExecError::Stated { reason }) if reason == "no map"));
@@ -212,7 +222,8 @@ mod tests {
     fn a_valid_answer_is_read_to_the_last_bit() {
         let read =
             parsed(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
-        assert_eq!(read, Answer { acceleration_mps2: -0.123_456_789_012_345_6, state: EgoState::Increasing });
+        let (acceleration_mps2, state) = (-0.123_456_789_012_345_6, EgoState::Increasing);
+        assert_eq!(read, Answer { acceleration_mps2, state, repeats_time: false });
         assert_eq!(parsed(br#"{"acceleration_mps2": 1, "state": "following"}"#).unwrap().acceleration_mps2, 1.0);
     }
 
