@@ -9,6 +9,7 @@ use closecall_campaign::record::{ArmRecord, Record};
 use closecall_scenarios::ScenarioFile;
 use closecall_scenarios::parameters::ParameterSpace;
 use closecall_scenarios::promise::Hindrance;
+use closecall_traffic::shown::shown;
 use serde::Serialize;
 
 use crate::campaign::outcomes::{CellValue, Column, OutcomeRow, PARAMETER, ParameterKind, columns};
@@ -78,7 +79,7 @@ impl Values {
         }
         let words = self.words.as_mut().filter(|words| words.len() <= MOST_WORDS)?;
         let index = u16::try_from(words.len()).ok()?;
-        words.push(word.clone());
+        words.push(shown(&word).into_owned());
         self.indices.insert(word, index);
         Some(index)
     }
@@ -105,7 +106,7 @@ impl Samples {
         let outcomes = || values_of(false).chain([Values::new(CAUSE, false)]).collect();
         Self {
             scenario: file.config().name.clone(),
-            arms: arms.to_vec(),
+            arms: arms.iter().map(|arm| shown(arm).into_owned()).collect(),
             is_paired: arms.len() > 1,
             numbers: Vec::new(),
             fates: Vec::new(),
