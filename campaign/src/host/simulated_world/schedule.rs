@@ -269,9 +269,9 @@ impl Setup {
         let journal = path.join(JOURNAL);
         let before = fs::read(&journal).unwrap();
         let mut lines: Vec<Vec<u8>> = before.split_inclusive(|byte| *byte == b'\n').map(<[u8]>::to_vec).collect();
-        // The end of a journal on a full disk is damage enough.
-        let is_whole = before.ends_with(b"\n");
-        if lines.is_empty() || !is_whole || reader != Reader::OfTheProgram {
+        // A full disk has damaged the journal already, or a signal has ended its repair.
+        let is_damaged = journal_lines(path).len() < lines.len();
+        if lines.is_empty() || is_damaged || reader != Reader::OfTheProgram {
             return Ok(false);
         }
         let line = random.random_range(0..lines.len());
