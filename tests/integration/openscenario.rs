@@ -1118,6 +1118,28 @@ fn a_place_of_the_road_triggers_by_distance_time_and_arrival() {
 }
 
 #[test]
+fn a_speed_follows_the_shape_of_its_action() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    let linear = "dynamicsShape=\"linear\" value=\"2\" dynamicsDimension=\"rate\"";
+    // After a quarter of the time, the share of the change is 1/4, 5/32 and (1 - cos 45°) / 2.
+    for (shape, share) in [("linear", 0.25), ("cubic", 0.15625), ("sinusoidal", 0.146_446_6)] {
+        let text =
+            SCENARIO.replacen(linear, &format!("dynamicsShape=\"{shape}\" value=\"8\" dynamicsDimension=\"time\""), 1);
+        let said = stdout(&imported(&written(folder.path(), &text, ROAD), &output, &[]), 0);
+        let begins_s = time_of(&said, "brake begins");
+        let scenario: toml::Table = toml::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
+        let profile = scenario["actor"][1]["driver"]["prescribed"]["profile"].as_array().unwrap();
+        let points: Vec<[f64; 2]> =
+            profile.iter().map(|point| [0, 1].map(|index| point[index].as_float().unwrap())).collect();
+        let pair = points.windows(2).find(|pair| pair[1][0] >= begins_s + 2.0).unwrap();
+        let [[t0, v0], [t1, v1]] = [pair[0], pair[1]];
+        let speed_mps = v0 + (v1 - v0) * (begins_s + 2.0 - t0) / (t1 - t0);
+        assert!((speed_mps - (20.0 - 10.0 * share)).abs() < 0.02, "{shape}: {speed_mps} m/s");
+    }
+}
+
+#[test]
 fn the_controllers_of_a_file_are_named_as_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");

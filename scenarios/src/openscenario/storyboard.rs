@@ -7,6 +7,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
+use closecall_traffic::maths;
+
 use super::condition::Memory;
 use super::dom::{ImportError, Node};
 use super::follow::Following;
@@ -85,11 +87,39 @@ pub(super) struct LaneChange {
     pub(super) element: &'static str,
 }
 
+/// How a value goes from one to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shape {
+    Linear,
+    Cubic,
+    Sinusoidal,
+}
+
+impl Shape {
+    /// Returns the share of the way after a part of the time.
+    fn share(self, part: f64) -> f64 {
+        match self {
+            Self::Linear => part,
+            Self::Cubic => part * part * (3.0 - 2.0 * part),
+            Self::Sinusoidal => 0.5 * (1.0 - maths::cos(PI * part)),
+        }
+    }
+
+    /// Returns the largest slope in relation to the mean one.
+    const fn steepness(self) -> f64 {
+        match self {
+            Self::Linear => 1.0,
+            Self::Cubic => 1.5,
+            Self::Sinusoidal => 0.5 * PI,
+        }
+    }
+}
+
 /// An action that takes time.
 #[derive(Clone, Debug)]
 enum Running {
-    /// A change of speed: from, to, begin, duration, and whether it is smooth.
-    Speed { vehicle: usize, from_mps: f64, to_mps: f64, begins_s: f64, duration_s: f64, is_smooth: bool },
+    /// A change of speed: from, to, begin, duration and shape.
+    Speed { vehicle: usize, from_mps: f64, to_mps: f64, begins_s: f64, duration_s: f64, shape: Shape },
     /// A speed relative to another vehicle, for ever.
     Relative { vehicle: usize, other: usize, value: f64, is_factor: bool },
     /// Speeds at times, linear in between.
@@ -545,11 +575,10 @@ impl<'a> Storyboard<'a> {
         }
         let to_mps = self.possible(node, to_mps)?;
         let from_mps = self.vehicles[actor].speed_mps;
-        let (duration_s, is_smooth) = self.transition(dynamics, from_mps, to_mps, 0.5 * (from_mps + to_mps))?;
+        let (duration_s, shape) = self.transition(dynamics, from_mps, to_mps, 0.5 * (from_mps + to_mps))?;
         if duration_s > 0.0 && actor != self.ego {
             // A smooth change of speed has a higher acceleration in its middle.
-            let steepness = if is_smooth { 1.5 } else { 1.0 };
-            self.check_acceleration(dynamics, steepness * (to_mps - from_mps) / duration_s)?;
+            self.check_acceleration(dynamics, shape.steepness() * (to_mps - from_mps) / duration_s)?;
         }
         self.check_dynamics(dynamics)?;
         running.is_longitudinal.push(actor);
@@ -560,7 +589,7 @@ impl<'a> Storyboard<'a> {
             self.vehicles[actor].speed_mps = to_mps;
         } else {
             let begins_s = self.time_s;
-            running.actions.push(Running::Speed { vehicle: actor, from_mps, to_mps, begins_s, duration_s, is_smooth });
+            running.actions.push(Running::Speed { vehicle: actor, from_mps, to_mps, begins_s, duration_s, shape });
         }
         Ok(())
     }
@@ -598,29 +627,28 @@ impl<'a> Storyboard<'a> {
         Ok(())
     }
 
-    /// Returns the duration of a transition (s), and whether it is smooth. `mean_mps` is the mean
+    /// Returns the duration of a transition (s), and its shape. `mean_mps` is the mean
     /// speed in it.
-    fn transition(&self, node: &Node, from: f64, to: f64, mean_mps: f64) -> Result<(f64, bool), ImportError> {
-        let shape = self.reader.text(node, "dynamicsShape")?;
-        // The largest slope of a smooth transition is higher than the mean one.
-        let (is_smooth, steepness) = match shape.as_str() {
-            "step" => return Ok((0.0, false)),
-            "linear" => (false, 1.0),
-            "sinusoidal" => (true, 0.5 * PI),
-            "cubic" => (true, 1.5),
-            _ => return Err(self.reader.error(node, format!("`dynamicsShape` is `{shape}`"))),
+    fn transition(&self, node: &Node, from: f64, to: f64, mean_mps: f64) -> Result<(f64, Shape), ImportError> {
+        let stated = self.reader.text(node, "dynamicsShape")?;
+        let shape = match stated.as_str() {
+            "step" => return Ok((0.0, Shape::Linear)),
+            "linear" => Shape::Linear,
+            "sinusoidal" => Shape::Sinusoidal,
+            "cubic" => Shape::Cubic,
+            _ => return Err(self.reader.error(node, format!("`dynamicsShape` is `{stated}`"))),
         };
         let value = self.reader.number(node, "value")?;
         let dimension = self.reader.text(node, "dynamicsDimension")?;
         let duration_s = match dimension.as_str() {
             "time" => value,
             "rate" if (to - from).abs() < SAME => 0.0,
-            "rate" => steepness * (to - from).abs() / value.abs(),
+            "rate" => shape.steepness() * (to - from).abs() / value.abs(),
             "distance" => value / mean_mps,
             _ => return Err(self.reader.error(node, format!("`dynamicsDimension` is `{dimension}`"))),
         };
         if duration_s.is_finite() && duration_s >= 0.0 {
-            return Ok((duration_s, is_smooth));
+            return Ok((duration_s, shape));
         }
         Err(self.reader.error(node, format!("it takes {duration_s} s to come from {from} to {to}")))
     }
@@ -750,11 +778,10 @@ impl<'a> Storyboard<'a> {
         let (mut set, mut lanes, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for event in &mut self.running {
             event.actions.retain(|action| match action {
-                Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, is_smooth } => {
-                    let share = ((time_s - begins_s) / duration_s).clamp(0.0, 1.0);
-                    let part = if *is_smooth { share * share * (3.0 - 2.0 * share) } else { share };
-                    set.push((*vehicle, from_mps + part * (to_mps - from_mps)));
-                    share < 1.0
+                Running::Speed { vehicle, from_mps, to_mps, begins_s, duration_s, shape } => {
+                    let part = ((time_s - begins_s) / duration_s).clamp(0.0, 1.0);
+                    set.push((*vehicle, from_mps + shape.share(part) * (to_mps - from_mps)));
+                    part < 1.0
                 }
                 Running::Relative { vehicle, other, value, is_factor } => {
                     let base_mps = before[*other];
