@@ -259,6 +259,25 @@ fn a_vehicle_on_a_ramp_leaves_its_lane_before_the_end_in_the_closed_loop() {
     assert_eq!(times[0], times[1]);
 }
 
+#[test]
+fn a_vehicle_with_the_name_of_a_class_has_an_entry_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scenario.toml");
+    let text = fs::read_to_string(PathBuf::from(ROOT).join("scenarios/library/low-thw-overtake.toml")).unwrap();
+    fs::write(&path, text.replace("\"rear\"", "\"car\"")).unwrap();
+    let case = folder.path().join("case");
+    let files = exported(&format!("{} --sensors ground-truth", path.display()), &case);
+    let catalog = fs::read_to_string(case.join("catalogs/vehicles/VehicleCatalog.xosc")).unwrap();
+    let mut names: Vec<&str> =
+        parts(&catalog, "<Vehicle ").iter().map(|entry| entry.split('"').nth(1).unwrap()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["car", "car-itself", "ego", "front", "motorcycle", "truck"]);
+    for (file, entry) in [("open-loop", "car-itself"), ("closed-loop", "car-itself"), ("logical", "$rear_class")] {
+        let (_, vehicle) = files[&format!("{file}.xosc")].split_once("<ScenarioObject name=\"car\">").unwrap();
+        assert_eq!(attribute(vehicle, "entryName"), entry, "{file}");
+    }
+}
+
 /// Runs the quality checkers of ASAM on the files below these folders.
 fn quality(python: &Path, folder: &Path) -> String {
     let script = PathBuf::from(ROOT).join("tests/integration/exchange/quality.py");

@@ -142,7 +142,7 @@ impl Case<'_> {
             return files;
         }
         files.files.push((ROAD_FILE.into(), road.document(&config.name)));
-        let named = scenario.actors.iter().map(|actor| (actor.id.to_string(), actor.vehicle));
+        let named = scenario.actors.iter().map(|actor| (vehicles::entry_name(&actor.id), actor.vehicle));
         let vehicles: Vec<_> = named.chain(classes(config)).collect();
         let catalog = Path::new(CATALOG_FOLDER).join(format!("{CATALOG}.xosc"));
         files.files.push((catalog, vehicles::document(&vehicles)));

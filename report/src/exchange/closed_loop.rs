@@ -30,7 +30,7 @@ use super::expression::{Expression, Values, parameter_name};
 use super::road::UsedRoad;
 use super::scenario::{Document, group, header, private, teleport};
 use super::trigger::{at, event, gap_below, headway_below, started, travelled};
-use super::vehicles::axle_to_centre_m;
+use super::vehicles::{axle_to_centre_m, entry_name};
 
 /// Braking by which a follower comes to its gap (m/s²): an assumption; 1 to 3 are plausible.
 const FOLLOWING_BRAKING_MPS2: f64 = 2.0;
@@ -122,7 +122,7 @@ impl Writer<'_> {
     fn entry(&self, index: usize) -> String {
         match self.config_of(index).map(|config| &config.vehicle.class) {
             Some(Choice::Parameter(name)) if self.values.are_named => format!("${}", parameter_name(name)),
-            _ => self.scenario.actors[index].id.to_string(),
+            _ => entry_name(&self.scenario.actors[index].id),
         }
     }
 

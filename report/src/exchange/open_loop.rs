@@ -10,7 +10,7 @@ use super::expression::Values;
 use super::motion::Motion;
 use super::scenario::{Document, group, header, private, teleport};
 use super::trigger::{at, event};
-use super::vehicles::axle_to_centre_m;
+use super::vehicles::{axle_to_centre_m, entry_name};
 use closecall_scenarios::ScenarioConfig;
 
 /// Returns the document. `motion` comes from a run of `scenario`, with the same order of vehicles.
@@ -38,7 +38,7 @@ pub(super) fn document(
             groups.push(group(actor.id.as_str(), vec![event(&name, "override", follow, when)]));
         }
     }
-    let entities = scenario.actors.iter().map(|actor| (actor.id.to_string(), actor.id.to_string(), Role::Human));
+    let entities = scenario.actors.iter().map(|actor| (actor.id.to_string(), entry_name(&actor.id), Role::Human));
     Document {
         header: header(description, unsaid, None),
         parameters: Vec::new(),

@@ -1,7 +1,7 @@
 //! The catalogue of vehicles, with dimensions and performance.
 
 use closecall_simulation::Performance;
-use closecall_traffic::{Dimensions, Environment, Vehicle, VehicleClass};
+use closecall_traffic::{ActorId, Dimensions, Environment, Vehicle, VehicleClass};
 
 use super::element::Element;
 use super::scenario::header;
@@ -32,6 +32,13 @@ pub(super) const fn category(class: VehicleClass) -> &'static str {
         VehicleClass::Truck => "truck",
         VehicleClass::Motorcycle => "motorbike",
     }
+}
+
+/// Returns the name of a vehicle's entry in the catalogue: the name of the vehicle, unless a class
+/// has it, whose entry stands there too.
+pub(super) fn entry_name(actor: &ActorId) -> String {
+    let is_class = VehicleClass::ALL.iter().any(|class| class.name() == actor.as_str());
+    format!("{actor}{}", if is_class { "-itself" } else { "" })
 }
 
 /// Returns the catalogue of these vehicles with their names, as a document.
