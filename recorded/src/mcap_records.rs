@@ -126,7 +126,7 @@ mod tests {
             let data = parts.concat();
             [&[opcode][..], &(data.len() as u64).to_le_bytes(), &data].concat()
         }
-        let name_length = (compression.len() as u32).to_le_bytes();
+        let name_length = u32::try_from(compression.len()).unwrap().to_le_bytes();
         let packed_length = (packed.len() as u64).to_le_bytes();
         let chunk: [&[u8]; 6] = [
             &[0; 16],
