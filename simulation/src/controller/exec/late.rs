@@ -17,7 +17,7 @@ static BAD_ENDS: Messages = Mutex::new(BTreeSet::new());
 static LEFT_OVER: Messages = Mutex::new(BTreeSet::new());
 
 /// Returns the messages about processes that ended badly since the last call, each once, at most 5,
-/// and those of [`take_left_over`].
+/// and what [`take_left_over`] returns.
 pub fn take_bad_ends() -> Vec<String> {
     [take(&BAD_ENDS), take_left_over()].concat()
 }
