@@ -14,6 +14,10 @@ const SAME_VEHICLE_M: f64 = 5.0;
 /// as if nothing were there.
 const BELIEVED: f64 = 0.5;
 
+/// Time within which a vehicle counts as seen from the start (s): an assumption; 0.05 to 0.2 are
+/// plausible. The ego begins to believe in a track with the second scan.
+const AT_START_S: f64 = 0.1;
+
 /// The vehicle of a track that belongs to none.
 const NO_VEHICLE: &str = "a vehicle that does not exist";
 
@@ -124,7 +128,7 @@ impl Film {
         let lost = self.lost(&spans);
         let vehicle = self.relevant_rear().map_or("The vehicle behind", |actor| self.vehicle_letter(actor));
         Some(match first {
-            Some((time, from_m)) if time > self.frames[0].time => {
+            Some((time, from_m)) if time.s() - self.frames[0].time.s() > AT_START_S => {
                 format!("{vehicle} was not seen behind until {:.2} s ({from_m:.0} m{weather}).{lost}", time.s())
             }
             Some((_, from_m)) => format!("{vehicle} was seen behind from the start ({from_m:.0} m{weather}).{lost}"),

@@ -443,6 +443,14 @@ fn a_vehicle_is_out_of_sight_while_the_ego_does_not_believe_in_its_track() {
 }
 
 #[test]
+fn a_vehicle_that_the_second_scan_shows_is_seen_from_the_start() {
+    let film = filmed("paper-figure", ControllerChoice::MIS, None, Level::Events);
+    assert!(film.frames[0].rear_seen.is_empty(), "the first scan shows it");
+    let sight = film.sight().unwrap();
+    assert!(sight.starts_with("R was seen behind from the start ("), "{sight}");
+}
+
+#[test]
 fn a_reason_that_holds_from_the_start_to_the_end_has_its_row() {
     let film = filmed("empty-wet-road", ControllerChoice::MIS, Some(SensorMode::GroundTruth), Level::Events);
     let has_none_behind = |command: EgoCommand| command.reason == Reason::NoRear;
