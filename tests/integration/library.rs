@@ -182,6 +182,23 @@ fn without_emergency_braking_its_family_fails() {
 }
 
 #[test]
+fn an_ego_that_is_always_slower_fails_the_families_of_the_other_functions() {
+    let scenarios = [
+        "aeb/aeb-lead-brakes",
+        "aeb/aeb-lead-brakes-gently",
+        "acc/acc-lead-slows",
+        "acc/acc-slow-vehicle-ahead",
+        "anchor/anchor-lead-brakes",
+    ];
+    for (scenario, controller) in scenarios.iter().flat_map(|name| ["blind", "crawl"].map(|slow| (name, slow))) {
+        let path = library(scenario);
+        let args = ["campaign", path.to_str().unwrap(), "-n", "60", "--paired", "--controller", controller];
+        let text = stdout(&closecall(args), 1);
+        assert!(text.contains("<= 0.05]") && text.contains("NOT MET"), "{scenario} {controller}: {text}");
+    }
+}
+
+#[test]
 fn a_setting_acts_on_the_arm_that_it_names_alone() {
     let path = library("aeb/aeb-lead-brakes");
     let arms = ["--arms", "acc-aeb,acc+aeb", "--set", "acc+aeb:aeb.max-deceleration-mps2=4.5"];
