@@ -31,6 +31,9 @@ const UNKNOWN_INTENSITY: f32 = 0.3;
 const LONGEST_SCAN_S: f64 = 1.0;
 /// Time by which a point may be measured after the end of its scan (s): the rounding of a stamp.
 const STAMP_ROUNDING_S: f64 = 1e-3;
+/// Distance by which the pitch of the ego moves a sensor along, at most (m). Assumption: a pitch of
+/// 0.3 rad at 3 m above the ground.
+const LARGEST_PITCH_SHIFT_M: f32 = 1.0;
 /// Number of columns on either side that are compared with the direction of a point, because the
 /// groups of layers are shifted.
 const SHIFTED_COLUMNS: usize = 4;
@@ -138,6 +141,19 @@ pub enum PointError {
         point: usize,
         /// Time from the point to the end of the scan (s).
         before_s: f64,
+    },
+    /// The recording and the scenario have the sensor at two places.
+    #[error(
+        "`sensor_x_m` is {sensor_x_m}, but the LiDAR `{lidar}` of the scenario is at {mounted_x_m} m: name the scenario whose \
+         LiDAR has recorded the scan"
+    )]
+    SensorPlace {
+        /// Place of the sensor ahead of the ego's centre in the recording (m).
+        sensor_x_m: f32,
+        /// The same in the scenario (m).
+        mounted_x_m: f32,
+        /// Name of the LiDAR.
+        lidar: &'static str,
     },
 }
 
@@ -251,12 +267,16 @@ impl RecordedPoints {
         let count = self.len();
         #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
         let sensor_m = [mounting.sensor_m.x as f32, mounting.sensor_m.y as f32];
+        let sensor_x_m = self.sensor_x_m.unwrap_or(sensor_m[0]);
+        if !((sensor_x_m - sensor_m[0]).abs() <= LARGEST_PITCH_SHIFT_M) {
+            return Err(PointError::SensorPlace { sensor_x_m, mounted_x_m: sensor_m[0], lidar: lidar.name() });
+        }
         let [x_m, y_m, z_m] = self.at_m;
         let scan = LidarScan {
             start,
             end: self.end,
             mirror_side: self.mirror_side,
-            sensor_x_m: self.sensor_x_m.unwrap_or(sensor_m[0]),
+            sensor_x_m,
             sensor_y_m: sensor_m[1],
             axis_azimuth_rad: lidar.azimuth_rad,
             resolution,
@@ -290,15 +310,19 @@ impl RecordedPoints {
         if let Some((point, &beam)) = wrong {
             return Err(PointError::Beam { point, beam, lidar: lidar.name(), last });
         }
-        if let PointTimes::Absolute(times_s) = &self.times {
-            for (point, time_s) in times_s.iter().enumerate() {
-                let before_s = self.end.s() - time_s;
-                if !(-STAMP_ROUNDING_S..=LONGEST_SCAN_S).contains(&before_s) {
-                    return Err(PointError::Time { point, before_s });
-                }
+        let sweep_s = lidar.kind.sweep_ns / NS_PER_S;
+        let before_s: Vec<f64> = match &self.times {
+            PointTimes::Unknown => Vec::new(),
+            PointTimes::SinceStart(offset_ns) => {
+                offset_ns.iter().map(|&ns| sweep_s - f64::from(ns) / NS_PER_S).collect()
             }
+            PointTimes::Absolute(times_s) => times_s.iter().map(|time_s| self.end.s() - time_s).collect(),
+        };
+        let is_outside = |before_s: &f64| !(-STAMP_ROUNDING_S..=LONGEST_SCAN_S).contains(before_s);
+        match before_s.iter().position(is_outside) {
+            Some(point) => Err(PointError::Time { point, before_s: before_s[point] }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Returns the start of the scan and the time of each point after it (ns). A sweep of the
@@ -459,5 +483,20 @@ mod tests {
         assert!(error.starts_with("point 1 has the beam 65000, but the LiDAR `rear-lidar`"), "{error}");
         let error = refused(RecordedPoints { times: PointTimes::Absolute(vec![0.1, 0.2, 0.1]), ..points() });
         assert!(error.starts_with("point 1 was measured -0.08") && error.contains("0 to 1 s"), "{error}");
+        let error = refused(RecordedPoints { times: PointTimes::SinceStart(vec![0, 0, 1_000_000_000]), ..points() });
+        assert!(error.starts_with("point 2 was measured -0.9"), "{error}");
+    }
+
+    #[test]
+    fn a_sensor_that_is_not_where_the_scenario_has_it_is_refused() {
+        let placed = |sensor_x_m: f32| {
+            let points = RecordedPoints { sensor_x_m: Some(sensor_x_m), ..points() };
+            points.into_scan(&Lidar::default(), PointFrame::Sensor, 4.6, ScanMotion::default()).map(drop)
+        };
+        assert_eq!(placed(-2.28), Ok(()));
+        for wrong in [f32::NAN, f32::INFINITY, -2000.0, 2.3] {
+            let error = placed(wrong).unwrap_err().to_string();
+            assert!(error.contains("`sensor_x_m`") && error.contains("of the scenario is at -2.3 m"), "{error}");
+        }
     }
 }
