@@ -24,10 +24,10 @@ const SHARE: f64 = 0.02;
 
 /// Largest share of these runs in which the ego may slow down. The library allows the same share
 /// for `slowed_unprompted`.
-const MOST: f64 = 0.05;
+pub(crate) const MOST: f64 = 0.05;
 
 /// Confidence of the bound on that share.
-const CONFIDENCE: f64 = 0.95;
+pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// Returns true if a sample of a scenario with these requirements runs again with nobody coming
 /// from behind.

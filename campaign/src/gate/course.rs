@@ -1,6 +1,8 @@
 //! The course of a sample: whether it shows anything about the system under test.
 
-use closecall_scenarios::criteria::{EGO_COLLIDED, Expression, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR};
+use closecall_scenarios::criteria::{
+    EGO_COLLIDED, Expression, FlagName, Measure, PairFlag, Quantity, SLOWED_FOR_REAR, SLOWED_UNPROMPTED,
+};
 use closecall_scenarios::{Function, ScenarioConfig};
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +19,8 @@ pub(crate) struct Course {
     /// Whether the system under test acted: it slowed the ego for a vehicle behind, or moved it
     /// otherwise than the baseline.
     pub(crate) acted: bool,
+    /// Whether the system under test slowed the ego before a vehicle behind was near.
+    pub(crate) slowed_unprompted: bool,
 }
 
 impl Course {
@@ -48,7 +52,8 @@ impl Course {
             };
             happened_in(Quantity::Tested) && (!is_paired || happened_in(Quantity::Baseline))
         });
-        Some(Self { happened, acted })
+        let slowed_unprompted = Measure::named(SLOWED_UNPROMPTED).is_some_and(|slowed| holds(Quantity::Tested(slowed)));
+        Some(Self { happened, acted, slowed_unprompted })
     }
 }
 
@@ -64,4 +69,13 @@ pub(crate) const fn missing_action(function: Function) -> &'static str {
 pub(crate) fn asks_for_action(config: &ScenarioConfig) -> bool {
     let of_prevented = |check: &Expression| check.quantity == Quantity::Pair(PairFlag::Prevented);
     config.checks.values().flatten().any(of_prevented)
+}
+
+/// Returns true if a check of a scenario bounds how often the ego is slowed before a vehicle behind
+/// is near.
+pub(crate) fn forbids_unprompted_slowing(config: &ScenarioConfig) -> bool {
+    let of_slowing = |check: &Expression| {
+        Measure::named(SLOWED_UNPROMPTED).is_some_and(|slowed| check.quantity == Quantity::Tested(slowed))
+    };
+    config.checks.values().flatten().any(of_slowing)
 }

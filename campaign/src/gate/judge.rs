@@ -294,7 +294,7 @@ fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String>
 
 impl Judged {
     fn observe_expectations(&mut self, record: &Record) {
-        let Some(Course { happened, acted }) = Course::of(record, &self.expects, self.function) else { return };
+        let Some(Course { happened, acted, .. }) = Course::of(record, &self.expects, self.function) else { return };
         self.samples += 1;
         self.happened += u64::from(happened);
         self.acted += u64::from(acted);

@@ -2,16 +2,19 @@
 //!
 //! A scenario states what must happen in a run for it to count (`expects`), and an event that
 //! cannot happen is rare. So a probability that is low enough is no pass if what the scenario is
-//! about did not happen, or if the system under test never acted.
+//! about did not happen, if the system under test never acted, or if it slowed the ego before a
+//! vehicle behind was near, which the scenario forbids.
 //!
 //! Later runs are moved towards the event. The first runs of every method are independent samples
 //! of the scenario: only they count for the share in which something happens.
 
 use closecall_scenarios::Function;
 use closecall_scenarios::criteria::FlagName;
+use closecall_traffic::statistics::interval::lower_bound;
 use closecall_traffic::words::counted;
 
-use crate::gate::{Course, ExpectationResult, asks_for_action, missing_action};
+use crate::attribution::{CONFIDENCE, MOST};
+use crate::gate::{Course, ExpectationResult, asks_for_action, forbids_unprompted_slowing, missing_action};
 use crate::record::Record;
 use crate::runner::Work;
 
@@ -24,11 +27,15 @@ pub(super) struct Relevance {
     function: Function,
     /// Whether a system that never acts was not tested.
     needs_action: bool,
+    /// Whether the scenario bounds how often the ego is slowed before a vehicle behind is near.
+    forbids_slowing: bool,
     /// Number of the first runs; `None` before them.
     first: Option<u64>,
-    /// First runs with an outcome, and those in which everything happened.
+    /// First runs with an outcome, those in which everything happened, and those in which the ego
+    /// was slowed before a vehicle behind was near.
     samples: u64,
     happened: u64,
+    slowed: u64,
     /// All runs with an outcome, and those in which the system acted.
     runs: u64,
     acted: u64,
@@ -44,9 +51,11 @@ impl Relevance {
             least_share: config.expects_share,
             function: config.function,
             needs_action: asks_for_action(config) && is_told,
+            forbids_slowing: forbids_unprompted_slowing(config),
             first: None,
             samples: 0,
             happened: 0,
+            slowed: 0,
             runs: 0,
             acted: 0,
         }
@@ -54,7 +63,7 @@ impl Relevance {
 
     /// Returns what a run shows; `None` if it has no outcome, or the scenario asks for nothing.
     pub(super) fn course(&self, record: &Record) -> Option<Course> {
-        let asks = !self.expects.is_empty() || self.needs_action;
+        let asks = !self.expects.is_empty() || self.needs_action || self.forbids_slowing;
         asks.then(|| Course::of(record, &self.expects, self.function)).flatten()
     }
 
@@ -65,12 +74,13 @@ impl Relevance {
 
     /// Counts a run by its number.
     pub(super) fn count(&mut self, run: u64, course: Option<Course>) {
-        let Some(Course { happened, acted }) = course else { return };
+        let Some(Course { happened, acted, slowed_unprompted }) = course else { return };
         self.runs += 1;
         self.acted += u64::from(acted);
         if self.first.is_some_and(|first| run < first) {
             self.samples += 1;
             self.happened += u64::from(happened);
+            self.slowed += u64::from(slowed_unprompted);
         }
     }
 
@@ -90,7 +100,15 @@ impl Relevance {
             let (missing, runs) = (missing_action(self.function), counted(self.runs, "run"));
             format!("the system under test never {missing} in {runs}, and they do not decide what it does")
         });
-        missed.into_iter().chain(idle).collect()
+        let is_slower = self.forbids_slowing && lower_bound(self.slowed, self.samples, CONFIDENCE) > MOST;
+        let slower = is_slower.then(|| {
+            format!(
+                "the system under test slowed the ego before a vehicle behind was near in {} of {}, and a slower ego needs no system",
+                self.slowed,
+                counted(self.samples, "sample")
+            )
+        });
+        missed.into_iter().chain(idle).chain(slower).collect()
     }
 }
 
@@ -100,6 +118,8 @@ mod tests {
 
     use super::*;
 
+    const ACTED: Course = Course { happened: true, acted: true, slowed_unprompted: false };
+
     fn relevance() -> Relevance {
         Relevance {
             scenario: "one".to_owned(),
@@ -107,9 +127,11 @@ mod tests {
             least_share: 0.5,
             function: Function::Mis,
             needs_action: true,
+            forbids_slowing: true,
             first: None,
             samples: 0,
             happened: 0,
+            slowed: 0,
             runs: 0,
             acted: 0,
         }
@@ -122,7 +144,7 @@ mod tests {
         relevance.begin(100);
         for run in 0..50 {
             // Everything happens in the runs that were moved towards the event.
-            relevance.count(run, Some(Course { happened: run >= 3, acted: true }));
+            relevance.count(run, Some(Course { happened: run >= 3, ..ACTED }));
         }
         let reasons = relevance.not_judged();
         assert!(
@@ -135,11 +157,29 @@ mod tests {
     fn a_system_that_acts_in_any_run_was_there_to_be_tested() {
         let mut relevance = relevance();
         relevance.begin(2);
-        relevance.count(0, Some(Course { happened: true, acted: false }));
+        relevance.count(0, Some(Course { acted: false, ..ACTED }));
         relevance.count(1, None);
         assert!(relevance.not_judged()[0].starts_with("the system under test never slowed the ego"));
-        relevance.count(2, Some(Course { happened: true, acted: true }));
+        relevance.count(2, Some(ACTED));
         assert_eq!(relevance.not_judged(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn an_ego_that_is_slower_where_the_scenario_forbids_it_is_not_judged() {
+        let reasons = |slowed: u64, forbids_slowing: bool| {
+            let mut relevance = Relevance { forbids_slowing, ..relevance() };
+            relevance.begin(100);
+            for run in 0..200 {
+                // The runs that were moved towards the event say nothing about it.
+                let slowed_unprompted = run < slowed || run >= 100;
+                relevance.count(run, Some(Course { slowed_unprompted, ..ACTED }));
+            }
+            relevance.not_judged()
+        };
+        let expected = "the system under test slowed the ego before a vehicle behind was near in 12 of 100 samples";
+        assert!(reasons(12, true)[0].starts_with(expected), "{:?}", reasons(12, true));
+        assert_eq!(reasons(4, true), Vec::<String>::new());
+        assert_eq!(reasons(12, false), Vec::<String>::new());
     }
 
     #[test]

@@ -60,7 +60,7 @@ impl Measure {
     /// decides.
     pub(super) fn exceeds(&self) -> Option<(&'static str, f64)> {
         match self.name {
-            "slowed_unprompted" => Some(("unprompted_deficit_mps", SLOWED_MPS)),
+            SLOWED_UNPROMPTED => Some(("unprompted_deficit_mps", SLOWED_MPS)),
             "braked_at_crossing" => Some(("crossing_braking_mps2", HARD_BRAKING_MPS2)),
             _ => None,
         }
@@ -189,6 +189,9 @@ fn thw_gain_s(outcome: &Outcome) -> Option<f64> {
 /// The measure of a system that acts for a vehicle behind, whatever it reports.
 pub const SLOWED_FOR_REAR: &str = "slowed_for_rear";
 
+/// The flag that the ego was slowed before a vehicle behind was near.
+pub const SLOWED_UNPROMPTED: &str = "slowed_unprompted";
+
 /// The measure that gates judge after the validity checks.
 pub const EGO_COLLIDED: &str = "ego_collided";
 
@@ -219,7 +222,7 @@ pub const MEASURES: &[Measure] = &[
         is(outcome.mis.as_ref().is_ok_and(|mis| mis.goal_in_reach == Some(true)))
     }),
     flag(
-        "slowed_unprompted",
+        SLOWED_UNPROMPTED,
         "the ego is slower than the lead vehicle by more than 0.5 m/s before a vehicle behind is within 100 m and approaches at 10 km/h or more",
         |outcome| cost(outcome, |cost| if cost.unprompted_deficit_mps > SLOWED_MPS { 1.0 } else { 0.0 }),
     ),

@@ -18,4 +18,6 @@ mod measure;
 pub use config::{FlagName, GateConfig};
 pub use event::{Event, EventError, EventExpression, Guide, GuideError};
 pub use expression::{Aggregate, Comparison, Expression, ExpressionError, Operator, Quantity, Side};
-pub use measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag, SLOWED_FOR_REAR, SLOWED_MPS};
+pub use measure::{
+    EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag, SLOWED_FOR_REAR, SLOWED_MPS, SLOWED_UNPROMPTED,
+};
