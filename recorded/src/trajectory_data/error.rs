@@ -370,7 +370,9 @@ pub enum TrajectoryFileProblem {
         place: String,
     },
     /// The road cannot be derived from the traffic, because no vehicle moves.
-    #[error("no vehicle moves, so that the road cannot be told from the traffic: are times or speeds missing, or in another unit?")]
+    #[error(
+        "no vehicle moves, so that the road cannot be told from the traffic: are times or speeds missing, or in another unit?"
+    )]
     NothingMoves,
     /// A folder contains several data sets.
     #[error(
