@@ -139,17 +139,17 @@ impl<S: Simulator> Run<'_, S> {
         Ok((particles, accepted as f64 / proposed.max(1) as f64))
     }
 
-    /// Chooses the levels. `None` if the particles do not come nearer to the event.
-    fn pilot(&mut self, rng: &mut Stream, budget: u64) -> Result<Option<Vec<Level>>, S::Error> {
+    /// Chooses the levels. Returns the reason if the particles do not come to the event.
+    fn pilot(&mut self, rng: &mut Stream, budget: u64) -> Result<Result<Vec<Level>, NoInterval>, S::Error> {
         let mut particles = self.start(rng)?;
         let (mut levels, mut step, mut last) = (Vec::new(), FIRST_STEP, f64::NEG_INFINITY);
         while levels.len() < MOST_LEVELS {
-            let Some(score) = next_score(&particles, last) else { return Ok(None) };
+            let Some(score) = next_score(&particles, last) else { return Ok(Err(NoInterval::NotReached)) };
             if score == f64::INFINITY {
-                return Ok(Some(levels));
+                return Ok(Ok(levels));
             }
             if self.runs + (MOVES * PARTICLES) as u64 > budget {
-                return Ok(None);
+                return Ok(Err(NoInterval::Budget));
             }
             let survivors: Vec<_> = particles.into_iter().filter(|(_, response)| response.level() >= score).collect();
             let level = Level { score, step };
@@ -160,7 +160,7 @@ impl<S: Simulator> Run<'_, S> {
             step = (step * exp(accepted - ACCEPTED)).clamp(STEP[0], STEP[1]);
             levels.push(level);
         }
-        Ok(None)
+        Ok(Err(NoInterval::NotReached))
     }
 
     /// Runs one repetition. Returns unbiased estimates of the means, and the number of particles
@@ -250,8 +250,9 @@ pub fn subset<S: Simulator>(
     if goal.budget < PARTICLES as u64 {
         return Ok(without(0, Vec::new(), NoInterval::Budget));
     }
-    let Some(levels) = run.pilot(&mut seed.stream("pilot", 0), goal.budget)? else {
-        return Ok(without(run.runs, Vec::new(), NoInterval::NotReached));
+    let levels = match run.pilot(&mut seed.stream("pilot", 0), goal.budget)? {
+        Ok(levels) => levels,
+        Err(reason) => return Ok(without(run.runs, Vec::new(), reason)),
     };
     // The number of repetitions must not depend on how many runs each of them takes, which its
     // outcome decides: the largest number counts.

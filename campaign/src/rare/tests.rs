@@ -173,8 +173,10 @@ fn an_impossible_event_has_a_bound_and_no_interval() {
     let bound = result.upper_bound_without_event.unwrap();
     assert!((bound * result.final_runs as f64 - 3.0).abs() < 0.01, "{bound}");
     assert!(result.runs <= goal.budget);
+    // The levels come nearer to the event until the budget ends.
     let result = subset(&mut Function(event), 2, Seed(0), goal).unwrap();
     assert!(result.means.is_none() && result.runs <= goal.budget);
+    assert_eq!(result.no_interval, Some(NoInterval::Budget));
 }
 
 #[test]
