@@ -283,7 +283,9 @@ impl fmt::Display for RareReport {
             None => {}
             Some(NoInterval::NotReached) => writeln!(f, "  no run came to the event: there is no estimate")?,
             Some(NoInterval::TooFewEvents) => writeln!(f, "  too few runs came to the event for an interval")?,
-            Some(NoInterval::Budget) => writeln!(f, "  the budget ended before the runs that an estimate rests on: it needs more runs")?,
+            Some(NoInterval::Budget) => {
+                writeln!(f, "  the budget ended before the runs that an estimate rests on: it needs more runs")?
+            }
         }
         if let Some(bound) = self.upper_bound_without_event {
             writeln!(f, "  its probability is at most {bound:.3e} with 95 % confidence")?;
