@@ -105,7 +105,7 @@ impl Shape {
         }
     }
 
-    /// Returns the largest slope in relation to the mean one.
+    /// Returns the largest slope of the shape, divided by its mean slope.
     const fn steepness(self) -> f64 {
         match self {
             Self::Linear => 1.0,
