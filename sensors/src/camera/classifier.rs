@@ -177,7 +177,10 @@ impl Classifier {
     /// has another input, or another output than four probabilities.
     pub fn of(file: Option<&str>, backend: &Backend) -> Result<Self, ClassifierError> {
         let Some(path) = file else { return Self::shipped(backend) };
-        let at = |reason: String| ClassifierError::Model { reason: format!("{path}: {reason}") };
+        let at = |reason: String| {
+            let needed = format!("it must take float [1, {CHANNELS}, {CROP_PX}, {CROP_PX}] and answer float [1, 4]");
+            ClassifierError::Model { reason: format!("{path}: {reason}; {needed}") }
+        };
         let bytes = read_network(path)?;
         let classifier = Self::new(&bytes, backend).map_err(|error| match error {
             ClassifierError::Model { reason } => at(reason),
@@ -185,9 +188,7 @@ impl Classifier {
         })?;
         let mut classifier = Self { name: path.to_owned(), ..classifier };
         classifier.classify(&Crop::default()).map_err(|error| match error {
-            ClassifierError::Run { reason } => at(format!(
-                "{reason}; it must take float [1, {CHANNELS}, {CROP_PX}, {CROP_PX}] and answer float [1, 4]"
-            )),
+            ClassifierError::Run { reason } => at(reason),
             other => other,
         })?;
         Ok(classifier)

@@ -37,9 +37,12 @@ pub struct CropClassifier {
     classifier: Classifier,
     crop: Crop,
     lists: FrameBuffers,
-    /// The detections that are due, by their index, and their windows.
-    due: Vec<usize>,
+    /// The detections that are due, by their index, and the index of their window.
+    due: Vec<(usize, usize)>,
+    /// The windows of these detections, each once.
     windows: Vec<PixelRect>,
+    /// The network's scores of the windows.
+    scores: Vec<ClassScores>,
 }
 
 impl CropClassifier {
@@ -56,6 +59,7 @@ impl CropClassifier {
             lists: FrameBuffers::default(),
             due: Vec::new(),
             windows: Vec::new(),
+            scores: Vec::new(),
         })
     }
 
@@ -63,13 +67,13 @@ impl CropClassifier {
     /// scores with the class scores that a detection has from its shape. Returns the number of
     /// crops that the network has classified.
     ///
-    /// If `memory` knows a detection, its scores are the scores of its latest crop. Detections out
-    /// of view, and detections entirely beside the road, keep their scores. `key` is the key of the
+    /// If `memory` knows a detection, its scores are the scores of its latest crop. Detections with
+    /// the same window, such as equal ones of a program, share a crop. Detections out of view, and detections entirely beside the road, keep their scores. `key` is the key of the
     /// exposure's noise.
     ///
     /// # Errors
-    /// Returns a [`ClassifierError`] if the network fails. The detections before the failure have
-    /// their new scores already.
+    /// Returns a [`ClassifierError`] if the network fails. Only the detections that `memory` knows
+    /// then have new scores.
     pub fn classify_with(
         &mut self,
         ImagedScene { now: scene, imaged, fault }: ImagedScene<'_>,
@@ -86,8 +90,11 @@ impl CropClassifier {
             match memory.recall(detection) {
                 Some(scores) => detection.class = fuse(&detection.class, &scores),
                 None => {
-                    self.due.push(index);
-                    self.windows.push(window);
+                    let earlier = self.windows.iter().position(|earlier| *earlier == window);
+                    self.due.push((index, earlier.unwrap_or(self.windows.len())));
+                    if earlier.is_none() {
+                        self.windows.push(window);
+                    }
                 }
             }
         }
@@ -99,17 +106,21 @@ impl CropClassifier {
         if let Some(fault) = fault {
             frame.add_glare(fault, imaged);
         }
-        for (index, window) in self.due.iter().zip(&self.windows) {
+        self.scores.clear();
+        for window in &self.windows {
             frame.crop(*window, &mut self.crop);
             if let Some(fault) = fault {
                 fault.apply(&mut self.crop, self.camera.camera().resolution);
             }
-            let image_scores = self.classifier.classify(&self.crop)?;
+            self.scores.push(self.classifier.classify(&self.crop)?);
+        }
+        self.lists = frame.into_buffers();
+        for (index, window) in &self.due {
+            let image_scores = self.scores[*window];
             memory.store(&detections[*index], image_scores);
             detections[*index].class = fuse(&detections[*index].class, &image_scores);
         }
-        self.lists = frame.into_buffers();
-        Ok(self.due.len())
+        Ok(self.windows.len())
     }
 }
 
@@ -258,6 +269,18 @@ mod tests {
         let mut empty_road = [detection(-12.0, 1.0, 0.8)];
         classify(&[], &mut empty_road);
         assert!(empty_road[0].class.vehicle() < 0.2, "{:?}", empty_road[0].class);
+    }
+
+    #[test]
+    fn equal_detections_of_a_scan_share_one_crop() {
+        let other = vehicle(VehicleClass::Truck, 460.0);
+        let at = |face_x_m: f64| detection(face_x_m, other.vehicle.dimensions.width_m, 3.0);
+        let (mut alone, mut many) = ([at(-36.0)], vec![at(-36.0); 256]);
+        many.insert(100, at(-20.0));
+        assert_eq!(classify(&[other], &mut alone), 1);
+        assert_eq!(classify(&[other], &mut many), 2, "each crop costs a run of the network");
+        assert!(many.iter().all(|seen| seen.class == alone[0].class || seen.face_x_m == -20.0));
+        assert_ne!(many[100].class, alone[0].class);
     }
 
     #[test]

@@ -142,7 +142,7 @@ impl BeamTable {
     /// [`ConfigError`] at the first wrong number.
     pub(super) fn new(beams: &[[f64; 3]], limits: BeamLimits) -> Result<Self, ConfigError> {
         if !(1..=MAX_BEAMS).contains(&beams.len()) {
-            let problem = Problem::WrongCount { value: beams.len() as u64, allowed: "a table of 1 to 65,535 beams" };
+            let problem = Problem::WrongLength { value: beams.len() as u64, allowed: "1 to 65,535" };
             return Err(ConfigError::new(KEY, problem));
         }
         for (index, beam) in beams.iter().enumerate() {
@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn a_wrong_table_is_answered_with_the_place_of_the_number() {
         let refused = |beams: &[[f64; 3]]| BeamTable::new(beams, LIMITS).unwrap_err().to_string();
-        assert_eq!(refused(&[]), "`beams` is 0, but a table of 1 to 65,535 beams is needed");
+        assert_eq!(refused(&[]), "`beams` has 0 entries, but 1 to 65,535 are allowed");
         let of_elevation = "`beams[1][1]` is -50, but a number from -45 to 45 is needed";
         assert_eq!(refused(&[[1.0, 2.0, 3.0], [1.0, -50.0, 3.0]]), of_elevation);
     }

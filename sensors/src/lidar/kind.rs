@@ -390,8 +390,9 @@ impl Check for LidarKindConfig {
         };
         let beams = azimuths_deg.len() * layers_deg.len();
         if beams > MAX_BEAMS {
-            let problem = Problem::WrongCount { value: beams as u64, allowed: "a pattern of at most 65,535 beams" };
-            return Err(ConfigError::new("layers-deg", problem));
+            let (layers, columns) = (layers_deg.len(), azimuths_deg.len());
+            let rule = format!("{layers} layers of {columns} beams are {beams}, and at most 65,535 are allowed");
+            return Err(ConfigError::new("layers-deg", Problem::Contradiction { other: "azimuth-step-deg", rule }));
         }
         for coefficient in self.mirror_cubic_deg.iter().flatten() {
             number(*coefficient, "mirror-cubic-deg", Range::closed(-5.0, 5.0))?;
