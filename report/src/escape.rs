@@ -46,6 +46,27 @@ fn block_start(text: &[char], escaped: &mut String) -> usize {
     blanks + digits + 1
 }
 
+/// Returns Markdown in which no underscore emphasises text: a vehicle may have the name `_lead_`.
+pub(crate) fn plain_underscores(markdown: &str) -> String {
+    let text: Vec<char> = markdown.chars().collect();
+    let mut escaped = String::with_capacity(markdown.len());
+    let mut index = 0;
+    while let Some(&c) = text.get(index) {
+        if c == '`' {
+            index = code_span(&text, index, &mut escaped);
+            continue;
+        }
+        let is_word =
+            |at: Option<usize>| at.and_then(|at| text.get(at)).is_some_and(|neighbour| neighbour.is_alphanumeric());
+        if c == '_' && !(is_word(index.checked_sub(1)) && is_word(Some(index + 1))) {
+            escaped.push('\\');
+        }
+        escaped.push(c);
+        index += 1;
+    }
+    escaped
+}
+
 /// Copies a code span that starts at `start`, or escapes backticks that start none. Returns the
 /// index after them.
 fn code_span(text: &[char], start: usize, escaped: &mut String) -> usize {
@@ -151,6 +172,17 @@ mod tests {
         ] {
             assert_eq!(in_markdown(text), text);
             assert_eq!(from_markdown(text), text);
+        }
+    }
+
+    #[test]
+    fn an_underscore_of_a_name_emphasises_nothing() {
+        for (text, expected) in [
+            ("- **acc:** _lead_ struck E", r"- **acc:** \_lead\_ struck E"),
+            ("__x__ OverTaker_2 a_", r"\_\_x\_\_ OverTaker_2 a\_"),
+            ("the code `_a_`", "the code `_a_`"),
+        ] {
+            assert_eq!(plain_underscores(text), expected);
         }
     }
 

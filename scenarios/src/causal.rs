@@ -22,11 +22,22 @@ use crate::promise::SHORTFALL_S;
 pub const LETTERS: &str = "E is the ego, F the lead vehicle, R the rear vehicle";
 
 /// The letters of the vehicles of an encounter: E is the ego, F the lead vehicle, R the rear
-/// vehicle. Any other vehicle has its name.
+/// vehicle. Any other vehicle has its name, see [`unlettered`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VehicleLetters {
     lead: Option<ActorId>,
     rear: Option<ActorId>,
+}
+
+/// Returns the name of a vehicle without a letter, as a text shows it beside letters: *vehicle R* is
+/// a vehicle that is named R, and may be elsewhere than behind the ego.
+pub fn unlettered(name: &str) -> &str {
+    match name {
+        "E" => "vehicle E",
+        "F" => "vehicle F",
+        "R" => "vehicle R",
+        _ => name,
+    }
 }
 
 impl VehicleLetters {
@@ -50,7 +61,7 @@ impl VehicleLetters {
         match vehicle {
             _ if self.lead.as_ref() == Some(vehicle) => "F",
             _ if self.rear.as_ref() == Some(vehicle) => "R",
-            _ => vehicle.as_str(),
+            _ => unlettered(vehicle.as_str()),
         }
     }
 
@@ -467,6 +478,8 @@ mod tests {
         assert_eq!(struck(["ego", "front"], [Front, Rear], First), "E struck F from behind");
         assert_eq!(struck(["ego", "left-2"], [Left, Front], Second), "left-2 struck E on its left side");
         assert_eq!(struck(["left-2", "rear"], [Right, Left], Second), "R struck left-2 on its right side");
+        assert_eq!(struck(["F", "rear"], [Right, Left], Second), "R struck vehicle F on its right side");
+        assert_eq!(struck(["R", "OverTaker"], [Right, Left], First), "vehicle R struck OverTaker on its left side");
         assert_eq!(struck(["ego", "rear"], [Front, Front], Both), "E struck R head-on");
     }
 

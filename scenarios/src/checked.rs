@@ -7,7 +7,7 @@ use closecall_controllers::{
 use closecall_sensors::Sensors;
 use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, GRAVITY_MPS2, KeyPath, LateralPath, Num, PHYSICS_STEP, Parameters,
-    Problem, Range, Road, Time, Vehicle, VehicleState,
+    Problem, Range, Road, Time, Vehicle, VehicleState, is_kebab_name,
 };
 
 use crate::coverage::CoveragePlan;
@@ -139,7 +139,7 @@ impl ScenarioConfig {
         }
         // The entry of an ensemble is named SCENARIO@MEMBER.
         let (name, member) = self.name.split_once('@').map_or((&self.name[..], None), |(name, of)| (name, Some(of)));
-        if ActorId::new(name).is_err() || member.is_some_and(|member| ActorId::new(member).is_err()) {
+        if !is_kebab_name(name) || member.is_some_and(|member| !is_kebab_name(member)) {
             let allowed = "the names of lower-case letters, digits and hyphens, starting with a letter,".to_owned();
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }

@@ -161,7 +161,8 @@ pub struct RandomNumbersConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ActorConfig {
-    /// Name: lower-case letters, digits and hyphens.
+    /// Name: letters, digits, hyphens and underscores, starting with a letter or an underscore. `Ego`
+    /// and `ego` are two names.
     pub id: ActorId,
     /// Class, size and appearance.
     pub vehicle: VehicleConfig,

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use closecall_traffic::{Check, KeyPath, Problem, Range, Segment};
+use closecall_traffic::{ActorId, Check, KeyPath, Problem, Range, Segment};
 use serde_json::{Value, json};
 use toml::Table;
 
@@ -26,7 +26,7 @@ const BEAMS_FILE: &str = "beams-file";
 const HUGE: f64 = 1e300;
 /// A bound of this size or larger is left out of the schema: the quantity may have any value.
 const UNBOUNDED: f64 = 1e12;
-/// The pattern of names.
+/// The pattern of the names of parameters.
 const NAME_PATTERN: &str = "^[a-z][a-z0-9-]*$";
 /// The pattern of the names of scenarios: SCENARIO, or SCENARIO@MEMBER for an entry of an ensemble.
 const SCENARIO_PATTERN: &str = "^[a-z][a-z0-9-]*(@[a-z][a-z0-9-]*)?$";
@@ -57,7 +57,7 @@ pub fn strict_schema() -> Value {
     insert("/properties/name", "pattern", json!(SCENARIO_PATTERN));
     insert("/properties/actor", "minItems", json!(1));
     insert("/properties/requirements", "uniqueItems", json!(true));
-    insert("/$defs/ActorId", "pattern", json!(NAME_PATTERN));
+    insert("/$defs/ActorId", "pattern", json!(ActorId::PATTERN));
     insert("/$defs/ParameterName", "pattern", json!(NAME_PATTERN));
     insert("/$defs/Lane", "minimum", json!(1));
     let one_of = |keys: &[&str]| {

@@ -43,7 +43,7 @@ const ROUNDING_M: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TrafficConfig {
-    /// Beginning of the vehicles' names: lower-case letters, digits and hyphens.
+    /// Beginning of the vehicles' names: a name as of an actor.
     pub id: ActorId,
     /// The number from which everything is drawn (-): a parameter with a uniform
     /// distribution from 0 to 1 gives other traffic in each sample, a fixed number the same.

@@ -1,6 +1,6 @@
 //! Names of sensors that a scenario can have more than once.
 
-use closecall_traffic::{ActorId, ConfigError, Problem};
+use closecall_traffic::{ConfigError, Problem, is_kebab_name};
 
 use crate::kept::kept;
 
@@ -19,7 +19,7 @@ pub(crate) fn checked_name(
     default_name: Option<&'static str>,
 ) -> Result<&'static str, ConfigError> {
     match (name, default_name) {
-        (Some(name), _) if ActorId::new(name).is_ok() => Ok(kept(name)),
+        (Some(name), _) if is_kebab_name(name) => Ok(kept(name)),
         (Some(name), _) => {
             let rule = format!("`{name}` is no name: it needs lower-case letters, digits and hyphens, a letter first");
             Err(ConfigError::new("name", Problem::Contradiction { other: "name", rule }))

@@ -91,7 +91,7 @@ pub mod words;
 
 pub use absent::{Absent, Measured};
 pub use acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
-pub use actor::{ActorId, InvalidActorId};
+pub use actor::{ActorId, InvalidActorId, is_kebab_name, kebab_name};
 pub use body_shape::BodyShape;
 pub use check::{Check, ConfigError, KeyPath, Problem, Range, Segment};
 pub use constants::{

@@ -245,11 +245,9 @@ impl Writer<'_> {
 
     fn drawn_vehicle(&self, index: usize) -> Vec<Element> {
         let id = self.scenario.actors[index].id.as_str();
-        let drawn = self
-            .config
-            .traffic
-            .iter()
-            .find(|traffic| id.strip_prefix(traffic.id.as_str()).is_some_and(|rest| rest.starts_with('-')));
+        // Two kinds of traffic may be called `left` and `left-lane`.
+        let begin = id.rsplit_once('-').map_or(id, |(begin, _)| begin);
+        let drawn = self.config.traffic.iter().find(|traffic| traffic.id.as_str() == begin);
         let merging = self.merging(index);
         let event = match drawn.map(|traffic| &traffic.driver) {
             Some(DriverConfig::Wiedemann99(model)) => self.following(index, |speed| self.wiedemann_gap(model, speed)),

@@ -34,11 +34,15 @@ pub(super) const fn category(class: VehicleClass) -> &'static str {
     }
 }
 
+/// End of the name of an entry that would otherwise have the name of another one.
+const ITSELF: &str = "-itself";
+
 /// Returns the name of a vehicle's entry in the catalogue: the name of the vehicle, unless a class
-/// has it, whose entry stands there too.
+/// has it, whose entry stands there too, or another vehicle's entry could have it.
 pub(super) fn entry_name(actor: &ActorId) -> String {
-    let is_class = VehicleClass::ALL.iter().any(|class| class.name() == actor.as_str());
-    format!("{actor}{}", if is_class { "-itself" } else { "" })
+    let stem = actor.as_str().trim_end_matches(ITSELF);
+    let is_class = VehicleClass::ALL.iter().any(|class| class.name() == stem);
+    format!("{actor}{}", if is_class { ITSELF } else { "" })
 }
 
 /// Returns the catalogue of these vehicles with their names, as a document.

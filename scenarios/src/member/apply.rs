@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use closecall_traffic::kebab_name;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::config::{Member, Set, SetValue};
@@ -248,7 +249,7 @@ fn put_parameter(document: &mut DocumentMut, name: &str, member: &Member, set: &
 fn new_name(document: &mut DocumentMut, path: &[String], key: &str) -> String {
     let actor = path.get(1).and_then(|index| index.parse().ok()).and_then(|index| actor_mut(document, index));
     let id = actor.and_then(|actor| actor.get("id")).and_then(Item::as_str).unwrap_or("driver").to_owned();
-    let mut name = format!("{id}-{}", key.replace('.', "-"));
+    let mut name = kebab_name(&format!("{id}-{key}"));
     let is_taken = |name: &str| {
         document.get("parameters").and_then(Item::as_table_like).is_some_and(|parameters| parameters.contains_key(name))
     };

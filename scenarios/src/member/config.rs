@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::parameters::ParameterConfig;
-use closecall_traffic::{ActorId, ConfigError};
+use closecall_traffic::{ConfigError, is_kebab_name};
 use serde::Deserialize;
 
 use super::keys::{KINDS, MODELS, unknown};
@@ -144,7 +144,7 @@ impl Member {
                 format!("{} is not {SCHEMA_VERSION}, the version that this program reads", config.schema_version);
             return Err(wrong("schema-version", message));
         }
-        if ActorId::new(&config.name).is_err() {
+        if !is_kebab_name(&config.name) {
             let message =
                 format!("`{}`: expected lower-case letters, digits and hyphens, starting with a letter", config.name);
             return Err(wrong("name", message));

@@ -9,6 +9,7 @@ use closecall_traffic::{Dimensions, Range, input};
 use super::dom::{ImportError, Node, parse};
 use super::formula::no_parameter;
 use super::reader::Reader;
+use super::storyboard::NOTED_OFFSET_M;
 use super::structure::{self, Given};
 use super::world::Vehicle;
 
@@ -41,7 +42,7 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError
         let mut vehicle = None;
         for child in &entity.children {
             match child.name.as_str() {
-                "Vehicle" => vehicle = Some(read_vehicle(reader, child)?),
+                "Vehicle" => vehicle = Some(read_vehicle(reader, child, &mut entities.notes)?),
                 "CatalogReference" => vehicle = Some(vehicle_in_catalog(reader, root, &mut catalogs, child)?),
                 "ObjectController" => entities.controlled.push((name.clone(), child.line)),
                 _ => {
@@ -55,7 +56,7 @@ pub(super) fn read(reader: &Reader, root: &Node) -> Result<Entities, ImportError
         let Some(vehicle) = vehicle else { return Err(reader.error(entity, format!("`{name}` has no vehicle"))) };
         entities.vehicles.push(Vehicle { name, line: entity.line, ..vehicle });
     }
-    entities.notes = catalogs.notes;
+    entities.notes.extend(catalogs.notes);
     Ok(entities)
 }
 
@@ -126,9 +127,15 @@ fn vehicle_in_catalog(
                 }
                 let mut entry = node.clone();
                 let assigned = assigned_values(reader, reference, &entry)?;
-                let notes = structure::check(&path, &mut entry, &assigned)?;
-                catalogs.notes.extend(notes.iter().map(|note| format!("{}, {note}", path.display())));
-                return read_vehicle(&Reader { path }, &entry);
+                let mut notes = structure::check(&path, &mut entry, &assigned)?;
+                let vehicle = read_vehicle(&Reader { path: path.clone() }, &entry, &mut notes)?;
+                // Several vehicles have one entry.
+                for note in notes.iter().map(|note| format!("{}, {note}", path.display())) {
+                    if !catalogs.notes.contains(&note) {
+                        catalogs.notes.push(note);
+                    }
+                }
+                return Ok(vehicle);
             }
         }
     }
@@ -154,8 +161,8 @@ fn assigned_values(reader: &Reader, reference: &Node, entry: &Node) -> Result<Gi
     Ok(assigned)
 }
 
-/// Reads an element `Vehicle`.
-fn read_vehicle(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
+/// Reads an element `Vehicle`, and adds notes on what is left out of it.
+fn read_vehicle(reader: &Reader, node: &Node, notes: &mut Vec<String>) -> Result<Vehicle, ImportError> {
     let category = reader.text(node, "vehicleCategory")?;
     let class = match category.as_str() {
         "car" | "van" => "car",
@@ -173,6 +180,14 @@ fn read_vehicle(reader: &Reader, node: &Node) -> Result<Vehicle, ImportError> {
         if centre.raw(name).is_some() {
             within(reader, centre, name, Range::closed(-size_m, size_m), "m")?;
         }
+    }
+    let beside_m = reader.number_or(centre, "y", 0.0)?;
+    if beside_m.abs() > NOTED_OFFSET_M {
+        notes.push(format!(
+            "line {}: the centre of the box lies {:.2} m beside the reference point: here it keeps the centre of the lane",
+            centre.line,
+            beside_m.abs()
+        ));
     }
     let mass_kg = match reader.number_or(node, "mass", 0.0)? {
         // Some programs write a mass of 0 if they do not know it.

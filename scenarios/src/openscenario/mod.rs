@@ -38,10 +38,11 @@ mod world;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::io;
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::words::counted;
-use closecall_traffic::{AlignmentPoint, Environment, Segment, input};
+use closecall_traffic::{ActorId, AlignmentPoint, Environment, Segment, input, kebab_name};
 
 pub use dom::ImportError;
 
@@ -368,7 +369,11 @@ fn ego_of(
     match (asked, controlled) {
         (Some(name), _) => position(name).map_or_else(|| refuse(format!("there is no vehicle `{name}`")), Ok),
         (None, controlled) => {
-            let usual = vehicles.iter().position(|vehicle| vehicle.name.eq_ignore_ascii_case("ego"));
+            let mut usual = (0..vehicles.len()).filter(|&index| vehicles[index].name.eq_ignore_ascii_case("ego"));
+            let (usual, second) = (usual.next(), usual.next());
+            if let (Some(usual), Some(second)) = (usual, second) {
+                return refuse(format!("`{}` and `{}` could be the ego", names[usual], names[second]));
+            }
             let only = if let [(name, _)] = controlled { position(name) } else { None };
             usual
                 .or(only)
@@ -474,11 +479,24 @@ fn rain_key(reader: &Reader, rain: &Node, notes: &mut Vec<String>) -> Result<Opt
     Ok(None)
 }
 
-/// Returns the name as Closecall writes names.
-fn kebab(name: &str) -> String {
-    let plain: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
-    if plain.starts_with(|c: char| c.is_ascii_lowercase()) { plain } else { format!("v-{plain}") }
+/// Returns the names of the vehicles in the scenario file. A vehicle keeps its name if a scenario can
+/// have it; another one gets the nearest name that no vehicle has, with a note.
+fn actor_names(vehicles: &[Vehicle], notes: &mut Vec<String>) -> Vec<ActorId> {
+    let kept: Vec<Option<ActorId>> = vehicles.iter().map(|vehicle| ActorId::new(&vehicle.name).ok()).collect();
+    let mut taken: BTreeSet<ActorId> = kept.iter().flatten().cloned().collect();
+    let mut names = Vec::with_capacity(vehicles.len());
+    for (vehicle, kept) in vehicles.iter().zip(kept) {
+        names.push(kept.unwrap_or_else(|| {
+            let nearest = ActorId::nearest(&vehicle.name);
+            let numbered = (2..).map(|number| ActorId::nearest(&format!("{nearest}_{number}")));
+            let free = iter::once(nearest.clone()).chain(numbered).find(|name| !taken.contains(name));
+            let name = free.unwrap_or(nearest);
+            taken.insert(name.clone());
+            notes.push(format!("`{}` is named `{name}`: a name has {}", vehicle.name, ActorId::ALLOWED));
+            name
+        }));
+    }
+    names
 }
 
 /// Returns the points of a profile: the speeds between which it is linear.
@@ -523,18 +541,8 @@ fn scenario_text(
         )
     });
     let mut actors = String::new();
-    let mut names: Vec<String> = Vec::new();
-    for (index, start) in starts.iter().enumerate() {
-        let id = kebab(&start.name);
-        if names.contains(&id) {
-            let message = format!("two vehicles would have the name `{id}`");
-            let element = "ScenarioObject".to_owned();
-            return Err(ImportError { path: path.to_owned(), line: start.line, element, message });
-        }
-        if id != start.name {
-            played.notes.push(format!("`{}` is named `{id}`", start.name));
-        }
-        names.push(id.clone());
+    let names = actor_names(starts, &mut played.notes);
+    for ((index, start), id) in starts.iter().enumerate().zip(names) {
         let mut speeds = played.speeds[index].clone();
         let at_start =
             speeds.iter().rev().find(|(at_s, _)| *at_s <= AT_START_S).map_or(start.speed_mps, |(_, mps)| *mps);
@@ -641,7 +649,7 @@ fn scenario_text(
         text,
         "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
          road = {{ lanes = {}, lane-width-m = {width}, {course}{}{}{} }}\n",
-        kebab(&stem),
+        kebab_name(&stem),
         road.lanes.len(),
         limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),
         if road.is_left_hand { ", overtaking-side = \"right\"" } else { "" },
@@ -676,8 +684,14 @@ mod tests {
     }
 
     #[test]
-    fn a_name_becomes_one_of_lower_case_letters_digits_and_hyphens() {
-        assert_eq!(kebab("OverTaker_2"), "overtaker-2");
-        assert_eq!(kebab("2nd"), "v-2nd");
+    fn a_vehicle_keeps_its_name_and_another_name_is_like_none_of_the_others() {
+        let written = ["Car 1", "Ego", "ego", "Car.1", "Car_1", "1", "_1", "é", "", "Car_1_2", "front"];
+        let vehicles = written.map(|name| Vehicle { name: name.to_owned(), ..Vehicle::default() });
+        let mut notes = Vec::new();
+        let names = actor_names(&vehicles, &mut notes);
+        let names: Vec<&str> = names.iter().map(ActorId::as_str).collect();
+        assert_eq!(names, ["Car_1_3", "Ego", "ego", "Car_1_4", "Car_1", "_1_2", "_1", "_", "__2", "Car_1_2", "front"]);
+        assert_eq!(notes.len(), 5, "{notes:?}");
+        assert!(notes[0].starts_with("`Car 1` is named `Car_1_3`: a name has letters (a-z, A-Z)"), "{notes:?}");
     }
 }

@@ -39,7 +39,7 @@ const MOST_ACCELERATION_MPS2: f64 = 12.0;
 /// plausible.
 const MOST_START_ANGLE_RAD: f64 = 0.1;
 /// Distance from the centre of a lane above which a note says so (m): numerical.
-const NOTED_OFFSET_M: f64 = 0.01;
+pub(super) const NOTED_OFFSET_M: f64 = 0.01;
 /// Largest distance beyond an end of the road (m): lengths and positions are rounded in files.
 const ROUNDING_M: f64 = 0.01;
 
@@ -150,6 +150,15 @@ struct RunningEvent {
     /// The numbers of its actions in the document. Each ends with the event.
     action_ids: Vec<usize>,
     actions: Vec<Running>,
+}
+
+/// How the actions at the beginning are performed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Round {
+    /// The vehicles to which a position or a speed is relative may not be set yet.
+    Set,
+    /// All are set: what is possible is checked, and what is left out is noted.
+    Checked,
 }
 
 /// A storyboard that is played.
@@ -268,6 +277,7 @@ impl<'a> Storyboard<'a> {
             if stops || self.time_s >= limit_s.min(LONGEST_S) {
                 self.end_s = self.time_s;
                 self.events.push((self.time_s, "storyboard ends".to_owned()));
+                self.note_what_never_begins(storyboard);
                 if !stops && stop.is_some() {
                     self.notes
                         .push(format!("the stop trigger never fires within {LONGEST_S} s: the scenario ends there"));
@@ -276,6 +286,18 @@ impl<'a> Storyboard<'a> {
             }
             self.check_meetings()?;
             self.advance();
+        }
+    }
+
+    /// Notes the events that have not begun at the end: nothing of them is in the scenario.
+    fn note_what_never_begins(&mut self, storyboard: &Node) {
+        let groups =
+            storyboard.all("Story").flat_map(|story| story.all("Act")).flat_map(|act| act.all("ManeuverGroup"));
+        let events = groups.flat_map(|group| group.all("Maneuver")).flat_map(|maneuver| maneuver.all("Event"));
+        for event in events.filter(|event| !self.done.contains(&event.id)) {
+            let name = event.raw("name").unwrap_or_default();
+            let note = format!("line {}: the event `{name}` never begins, and its actions are left out", event.line);
+            self.notes.push(note);
         }
     }
 
@@ -822,6 +844,12 @@ impl<'a> Storyboard<'a> {
             self.vehicles[vehicle].offset_m = offset_m;
         }
         for (vehicle, speed_mps) in set {
+            if speed_mps < -SAME {
+                let stands = format!("`{}` stands where its relative speed is below 0", self.vehicles[vehicle].name);
+                if !self.notes.iter().any(|note| note.starts_with(&stands)) {
+                    self.notes.push(format!("{stands}, from {time_s:.2} s: no vehicle of a scenario drives backwards"));
+                }
+            }
             self.vehicles[vehicle].speed_mps = speed_mps.max(0.0);
         }
         for (vehicle, before_mps) in self.vehicles.iter_mut().zip(before) {
@@ -866,23 +894,14 @@ impl<'a> Storyboard<'a> {
     pub(super) fn init(&mut self, storyboard: &Node) -> Result<Vec<Node>, ImportError> {
         let actions = self.reader.child(storyboard, &["Init", "Actions"])?.clone();
         let mut globals = Vec::new();
-        // A speed can be relative to a vehicle whose actions stand behind: the positions and speeds
-        // are set twice.
-        for round in 0..2 {
-            for node in &actions.children {
-                match node.name.as_str() {
-                    "GlobalAction" if round == 0 => globals.push(self.reader.only(node)?.clone()),
-                    "GlobalAction" => {}
-                    "Private" => {
-                        let vehicle = self.index(node, "entityRef")?;
-                        for action in node.all("PrivateAction") {
-                            self.init_action(self.reader.only(action)?, vehicle, round)?;
-                        }
-                    }
-                    _ => return Err(self.reader.error(node, "this action is not read")),
-                }
+        for node in &actions.children {
+            match node.name.as_str() {
+                "GlobalAction" => globals.push(self.reader.only(node)?.clone()),
+                "Private" => {}
+                _ => return Err(self.reader.error(node, "this action is not read")),
             }
         }
+        self.set_starts(&actions)?;
         match self.vehicles.iter().find(|vehicle| !vehicle.is_placed) {
             Some(vehicle) => {
                 Err(self.reader.error(&actions, format!("no `TeleportAction` says where `{}` starts", vehicle.name)))
@@ -891,7 +910,34 @@ impl<'a> Storyboard<'a> {
         }
     }
 
-    fn init_action(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
+    /// Sets the positions and speeds at the beginning. They can be relative to a vehicle whose actions
+    /// stand behind, and to several in turn: they are set until they stay the same, and checked then.
+    fn set_starts(&mut self, actions: &Node) -> Result<(), ImportError> {
+        let state = |vehicle: &Vehicle| (vehicle.s_m, vehicle.lane, vehicle.offset_m, vehicle.speed_mps);
+        for _ in 0..=self.vehicles.len() {
+            let before: Vec<_> = self.vehicles.iter().map(state).collect();
+            self.round(actions, Round::Set)?;
+            if before.iter().zip(&self.vehicles).all(|(before, vehicle)| *before == state(vehicle)) {
+                return self.round(actions, Round::Checked);
+            }
+        }
+        let message =
+            "the starts and speeds of vehicles are relative to each other in a circle: one of them must be absolute";
+        Err(self.reader.error(actions, message))
+    }
+
+    fn round(&mut self, actions: &Node, round: Round) -> Result<(), ImportError> {
+        for node in actions.all("Private") {
+            let vehicle = self.index(node, "entityRef")?;
+            for action in node.all("PrivateAction") {
+                self.init_action(self.reader.only(action)?, vehicle, round)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn init_action(&mut self, node: &Node, vehicle: usize, round: Round) -> Result<(), ImportError> {
+        let is_last = round == Round::Checked;
         match node.name.as_str() {
             "TeleportAction" => {
                 let position = self.reader.only(self.reader.child(node, &["Position"])?)?;
@@ -902,7 +948,7 @@ impl<'a> Storyboard<'a> {
                 match inner.name.as_str() {
                     "SpeedAction" => {
                         let (speed_mps, stays) = self.target_speed(inner)?;
-                        if stays.is_some() && round == 1 {
+                        if stays.is_some() && is_last {
                             self.notes.push(format!(
                                 "line {}: the speed of `{}` is relative to another at the start, and does not follow it afterwards",
                                 inner.line, self.vehicles[vehicle].name
@@ -911,26 +957,23 @@ impl<'a> Storyboard<'a> {
                         let dynamics = inner.child("SpeedActionDynamics");
                         let shape = dynamics.and_then(|dynamics| dynamics.raw("dynamicsShape"));
                         dynamics.map(|dynamics| self.check_dynamics(dynamics)).transpose()?;
-                        if round == 1 && shape.is_some_and(|shape| shape != "step") {
+                        if is_last && shape.is_some_and(|shape| shape != "step") {
                             self.notes.push(format!(
                                 "line {}: `{}` starts with the target speed, and does not come to it",
                                 inner.line, self.vehicles[vehicle].name
                             ));
                         }
-                        // In the first round, the speed of another vehicle may not be set yet.
-                        let is_last = round == 1;
+                        // In the other rounds, the speed of another vehicle may not be set yet.
                         self.vehicles[vehicle].speed_mps =
                             if is_last { self.possible(inner, speed_mps)? } else { speed_mps };
                         Ok(())
                     }
-                    "LongitudinalDistanceAction" => self.keep_distance(inner, vehicle),
+                    "LongitudinalDistanceAction" => self.keep_distance(inner, vehicle, round),
                     _ => Err(self.reader.error(inner, "this action is not read")),
                 }
             }
             "ControllerAction" | "ActivateControllerAction" => {
-                if round == 0 {
-                    self.note_controller(node.line, vehicle);
-                }
+                self.note_controller(node.line, vehicle);
                 Ok(())
             }
             _ => Err(self.reader.error(node, "this action is not read")),
@@ -951,7 +994,7 @@ impl<'a> Storyboard<'a> {
     }
 
     /// Puts a vehicle at the distance from another that an action asks for at the beginning.
-    fn keep_distance(&mut self, node: &Node, vehicle: usize) -> Result<(), ImportError> {
+    fn keep_distance(&mut self, node: &Node, vehicle: usize, round: Round) -> Result<(), ImportError> {
         let other = self.index(node, "entityRef")?;
         if is_true(node, "continuous") {
             return Err(self
@@ -981,6 +1024,10 @@ impl<'a> Storyboard<'a> {
             (true, true) => leader.front_m() + distance_m - (follower.back_m() - follower.s_m),
             (true, false) => leader.back_m() - distance_m - (follower.front_m() - follower.s_m),
         };
+        if let Some(limits) = node.child("DynamicConstraints").filter(|_| round == Round::Checked) {
+            let name = &self.vehicles[vehicle].name;
+            self.notes.push(format!("line {}: `{name}` starts at its distance, and does not come to it", limits.line));
+        }
         self.vehicles[vehicle].s_m = s_m;
         self.vehicles[vehicle].start = (node.line, node.name.clone());
         Ok(())
@@ -999,7 +1046,7 @@ impl<'a> Storyboard<'a> {
     }
 
     /// Returns the position along the road (m) and the lane of a position in the plane.
-    fn in_plane(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(f64, i32), ImportError> {
+    fn in_plane(&mut self, node: &Node, vehicle: usize, round: Round) -> Result<(f64, i32), ImportError> {
         let point = self.on_road(node, None)?;
         let heading_rad = self.reader.number_or(node, "h", 0.0)?;
         if let Some(line) = self.road.line
@@ -1014,7 +1061,7 @@ impl<'a> Storyboard<'a> {
         if !(beside_m.abs() <= self.road.half_width_m(index)) {
             return Err(self.reader.error(node, format!("it lies {:.2} m beside the nearest lane", beside_m.abs())));
         }
-        if beside_m.abs() > NOTED_OFFSET_M && round == 1 {
+        if beside_m.abs() > NOTED_OFFSET_M && round == Round::Checked {
             self.notes.push(format!(
                 "line {}: `{}` starts at the centre of its lane, {:.2} m beside its position in the file",
                 node.line,
@@ -1025,7 +1072,20 @@ impl<'a> Storyboard<'a> {
         Ok((point.s_m, self.road.lanes[index]))
     }
 
-    fn place(&mut self, node: &Node, vehicle: usize, round: usize) -> Result<(), ImportError> {
+    /// Returns the vehicle to which a position is relative, or `None` if another round places it.
+    fn placed(&self, node: &Node, round: Round) -> Result<Option<&Vehicle>, ImportError> {
+        let other = self.vehicle(node, "entityRef")?;
+        if !other.is_placed && round == Round::Checked {
+            let message = format!(
+                "it is relative to `{}`, which starts nowhere: it has no start, or the starts lead back to it in a circle",
+                other.name
+            );
+            return Err(self.reader.error(node, message));
+        }
+        Ok(other.is_placed.then_some(other))
+    }
+
+    fn place(&mut self, node: &Node, vehicle: usize, round: Round) -> Result<(), ImportError> {
         let reader = self.reader.clone();
         let offset_m = reader.number_or(node, "offset", 0.0)?;
         if offset_m != 0.0 && vehicle == self.ego {
@@ -1050,7 +1110,7 @@ impl<'a> Storyboard<'a> {
             }
             "WorldPosition" => self.in_plane(node, vehicle, round)?,
             "RelativeLanePosition" => {
-                let other = self.vehicle(node, "entityRef")?;
+                let Some(other) = self.placed(node, round)? else { return Ok(()) };
                 let shift_m = if node.raw("ds").is_some() {
                     reader.number(node, "ds")?
                 } else {
@@ -1059,7 +1119,7 @@ impl<'a> Storyboard<'a> {
                 (other.s_m + shift_m, self.shifted(other.lane, reader.number(node, "dLane")? as i32))
             }
             "RelativeRoadPosition" => {
-                let other = self.vehicle(node, "entityRef")?;
+                let Some(other) = self.placed(node, round)? else { return Ok(()) };
                 let shift_m = reader.number(node, "dt")?;
                 let from_m = self.road.index(other.lane).map_or(f64::NAN, |index| self.road.centres_m[index]);
                 let beside_m = |index: usize| (from_m + shift_m - self.road.centres_m[index]).abs();
@@ -1085,7 +1145,7 @@ impl<'a> Storyboard<'a> {
             let message = format!("lane {lane} is not a driving lane along the road, only {}", lanes.join(", "));
             // The other vehicle may not be placed yet.
             let is_relative = !matches!(node.name.as_str(), "LanePosition" | "WorldPosition");
-            return if round == 0 && is_relative { Ok(()) } else { Err(reader.error(node, message)) };
+            return if round == Round::Set && is_relative { Ok(()) } else { Err(reader.error(node, message)) };
         }
         let (lane, offset_m) = self.lane_beside(node, lane, offset_m)?;
         let placed = &mut self.vehicles[vehicle];

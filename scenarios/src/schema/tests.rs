@@ -1,6 +1,6 @@
 use std::sync::LazyLock;
 
-use closecall_traffic::ActorId;
+use closecall_traffic::{ActorId, is_kebab_name};
 
 use super::super::library;
 use super::*;
@@ -52,8 +52,10 @@ fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
             let is_criterion = pattern.contains("(<=|>=)");
             let is_matched = if is_criterion {
                 text.parse::<Expression>().is_ok()
-            } else {
+            } else if pattern == ActorId::PATTERN {
                 name.is_some_and(|name| ActorId::new(name).is_ok())
+            } else {
+                name.is_some_and(is_kebab_name)
             };
             rule(is_matched, "pattern")
         })

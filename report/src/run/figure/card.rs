@@ -154,7 +154,7 @@ fn vehicle(film: &Film, actor: usize, window: Window) -> Markup {
             // Whom the sentence names is named here, too. All other traffic has no name.
             @if letter.is_empty() && film.is_labelled(actor) {
                 text y=(format!("{:.2}", -0.5 * width_m - NAME_ABOVE_M)) font-size=(LETTER_M) text-anchor="middle" fill=(colour(film, actor)) {
-                    (film.actors[actor].name)
+                    (film.vehicle_letter(actor))
                 }
             }
         }

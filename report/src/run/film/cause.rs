@@ -1,6 +1,6 @@
 //! The cause of a run's end: the sentence about it, and the letters of its vehicles.
 
-use closecall_scenarios::causal::CausalSentence;
+use closecall_scenarios::causal::{CausalSentence, unlettered};
 use closecall_scenarios::outcome::Collision;
 use closecall_studies::attribution::Avoidable;
 
@@ -52,7 +52,7 @@ impl Film {
             Part::Ego => "E",
             Part::Lead => "F",
             Part::Rear => "R",
-            Part::Other(_) | Part::Background => &self.actors[actor].name,
+            Part::Other(_) | Part::Background => unlettered(&self.actors[actor].name),
         }
     }
 
@@ -66,7 +66,7 @@ impl Film {
             Part::Ego => "E",
             Part::Lead => "F",
             Part::Rear => "R",
-            Part::Other(_) | Part::Background => return name.clone(),
+            Part::Other(_) | Part::Background => return unlettered(name).to_owned(),
         };
         format!("{letter} {name}")
     }

@@ -5,6 +5,7 @@ use closecall_traffic::Time;
 
 use super::{Film, headway_text};
 use crate::run::text::touch_text;
+use closecall_scenarios::causal::unlettered;
 use closecall_scenarios::outcome::Collision;
 use closecall_simulation::RunEvent;
 
@@ -88,7 +89,7 @@ impl Film {
         match event {
             RunEvent::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
             RunEvent::DriverNote { actor, note } => {
-                plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note)))
+                plain(format!("{} {}", unlettered(&self.actors[*actor].name), driver_note_text(*note)))
             }
             RunEvent::EgoStateChanged { to, reason, .. } => {
                 let text = format!("ego: {} ({reason})", ego_state_name(*to));

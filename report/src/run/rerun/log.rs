@@ -11,6 +11,7 @@ use super::plots::phase_name;
 use super::stream::Writer;
 use crate::run::film::{Film, KnownSpan, driver_note_text, ego_state_name};
 use crate::run::text::touch_text;
+use closecall_scenarios::causal::unlettered;
 use closecall_simulation::RunEvent;
 
 /// One line of the log.
@@ -93,7 +94,7 @@ fn line(film: &Film, time: Time, event: &RunEvent) -> Line {
     match event {
         RunEvent::EventTriggered { event } => warn("log/event", format!("event `{event}` sets in")),
         RunEvent::DriverNote { actor, note } => {
-            let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());
+            let name = film.actors.get(*actor).map_or("?", |actor| unlettered(&actor.name));
             info("log/driver", format!("{name} {}", driver_note_text(*note)))
         }
         RunEvent::EgoStateChanged { from, to, reason } => {

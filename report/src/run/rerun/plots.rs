@@ -391,9 +391,10 @@ impl Plots<'_> {
             )?;
         }
         let commanded = CurveStyle { name: "ego, commanded", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
-        self.curve("plots/acceleration/commanded", &commanded, |frame| Some(frame.command?.acceleration_mps2))?;
+        // Vehicles have names of one part, so that none takes the place of these curves.
+        self.curve("plots/acceleration/commanded/ego", &commanded, |frame| Some(frame.command?.acceleration_mps2))?;
         for (number, limit) in self.film.acceleration_limits.iter().enumerate() {
-            self.level(&format!("plots/acceleration/limit_{number}"), &limit.name, limit.value)?;
+            self.level(&format!("plots/acceleration/limits/{}", number + 1), &limit.name, limit.value)?;
         }
         Ok(())
     }

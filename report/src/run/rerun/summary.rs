@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use closecall_traffic::{Measured, Time};
 
+use crate::escape::plain_underscores;
 use crate::run::film::{Film, fate_word, headway_text};
 use closecall_campaign::ledger::PairFate;
 use closecall_scenarios::causal::{CausalSentence, LETTERS};
@@ -38,7 +39,7 @@ fn strong(page: &str) -> String {
         Some(("-", text)) => format!("- **{}**", text.replace("**", "").trim()),
         _ => format!("**{}**", line.replace("**", "").trim()),
     };
-    page.lines().map(|text| line(text) + "\n").collect()
+    page.lines().map(|text| line(&plain_underscores(text)) + "\n").collect()
 }
 
 /// Returns the story in Markdown: the events of each film, the table of each film, and the key of

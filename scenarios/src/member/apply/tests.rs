@@ -59,6 +59,17 @@ fn the_human_driver_of_the_ego_is_changed_as_the_others_are_with_draws_of_its_ow
 }
 
 #[test]
+fn the_parameter_of_a_vehicle_of_any_name_has_a_name_of_a_parameter() {
+    let text = library::text("paper-figure").unwrap().replace("\"rear\"", "\"OverTaker_2\"");
+    let file = ScenarioFile::parse(&library::path("paper-figure"), &text, &[]).unwrap();
+    let set = "[[set]]\nkey = 'reaction-s'\nvalue = { uniform = { min = 1.0, max = 2.0 } }\nsource = 'x'\n";
+    let entry = entry(&member(set), &file);
+    let Sampled::Number(reaction_s) = sampled(&entry, "overtaker-2-reaction-s") else { panic!("a number") };
+    assert!((1.0..2.0).contains(&reaction_s));
+    entry.check().unwrap();
+}
+
+#[test]
 fn a_distribution_for_a_fixed_value_becomes_a_new_parameter() {
     let file = scenario("paper-figure");
     let set = "[[set]]\nkey = 'reaction-s'\nvalue = { uniform = { min = 1.0, max = 2.0 } }\nsource = 'x'\n";

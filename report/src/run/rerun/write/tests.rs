@@ -131,6 +131,33 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
 }
 
 #[test]
+fn vehicles_of_any_name_have_entities_of_their_own() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
+    let path = folder.join("low-thw-overtake.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let names = [("\"front\"", "\"commanded\""), ("\"rear\"", "\"Ego\"")];
+    let text = names.into_iter().fold(text, |text, (own, other)| text.replace(own, other));
+    let file = ScenarioFile::parse(&path, &text, &[]).unwrap();
+    let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
+    let scenario = concrete(&file, sampling, 0).unwrap();
+    let (arm, key) =
+        (Arm { controller: ControllerChoice::MIS.factory(), sensors: None }, RunKey { seed: 1, sample: 0 });
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Full);
+    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
+    let data = chunks(&[recorder.finish(&outcome)], StoreKind::Recording);
+    let has = |entity: &str| data.iter().any(|chunk| chunk.entity_path().to_string() == entity);
+    for name in ["ego", "Ego", "commanded", "commanded/ego"] {
+        assert!(has(&format!("/mis/plots/acceleration/{name}")), "{name}");
+    }
+    // A curve has one row for each time, so that no other curve has its entity.
+    let rows = |name: &str| {
+        let of_curve = |chunk: &&Chunk| chunk.entity_path().to_string() == format!("/mis/plots/acceleration/{name}");
+        data.iter().filter(of_curve).map(Chunk::num_rows).max().unwrap()
+    };
+    assert_eq!(rows("commanded"), rows("ego"));
+}
+
+#[test]
 fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
     let film = |controller| filmed("paper-figure", controller, None, Level::Objects);
     let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
