@@ -147,6 +147,7 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
                        `heading_rad`; without them, the road is the arc that the ego drives";
         return Err(CliError::usage(message));
     }
+    poses.check_on(&scenario.road)?;
     let labels = labels(&recording, args.labels.as_deref(), &poses)?;
     let ego = scenario.vehicle(scenario.ego, key);
     let frame = match args.frame {

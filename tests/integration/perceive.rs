@@ -132,6 +132,81 @@ fn other_settings_of_the_chain_give_other_tracks() {
     }
 }
 
+#[test]
+fn absurd_places_and_values_of_a_recording_are_refused() {
+    let folder = folder();
+    let [scenario, scans, _] = record(folder.path(), "", "scans.parquet");
+    // The row of each table that is changed, whose line in the file is one more.
+    const ROW: usize = 30;
+    let changed = |name: &str, column: &str, value: &str, is_changed: &dyn Fn(usize) -> bool| {
+        let path = folder.path().join(format!("scans.{name}.csv"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        let index = text.lines().next().unwrap().split(',').position(|field| field == column).unwrap();
+        let change = |(row, line): (usize, &str)| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if row > 0 && is_changed(row) {
+                fields[index] = value;
+            }
+            fields.join(",")
+        };
+        std::fs::write(&path, text.lines().enumerate().map(change).collect::<Vec<_>>().join("\n") + "\n").unwrap();
+        let message = refusal(&scans, &scenario);
+        std::fs::write(&path, text).unwrap();
+        message
+    };
+    let line = ROW + 1;
+    for (name, column, value, expected) in [
+        ("poses", "s_m", "-500", "the ego moves "),
+        ("poses", "d_m", "-500", "the ego moves "),
+        ("poses", "x_m", "-500", "the ego moves "),
+        ("poses", "yaw_rad", "1.5", "the ego turns by 1.5 rad in 0.040 s, but 0.6 rad is allowed"),
+        ("poses", "heading_rad", "3", "3 is out of range: an angle from -π/2 to π/2 rad is needed"),
+        ("poses", "speed_mps", "500", "500 is out of range: a speed from 0 to 150 m/s is needed"),
+        ("labels", "y_m", "-500", " moves "),
+    ] {
+        let text = changed(name, column, value, &|row| row == ROW);
+        assert!(text.contains(&format!("scans.{name}.csv, line {line}, column `{column}`: ")), "{text}");
+        assert!(text.contains(expected), "{text}");
+    }
+    let text = changed("poses", "d_m", "-500", &|_| true);
+    assert!(
+        text.contains("`d_m` is -500 at ") && text.contains("beside the road of the scenario: -21.25 to 10 m"),
+        "{text}"
+    );
+
+    // The values of a table are named with their row.
+    let batches = read(&scans);
+    let beams = |kind: &DataType, wrong: f64| {
+        let path = folder.path().join("beams.parquet");
+        let batches: Vec<RecordBatch> = batches
+            .iter()
+            .map(|batch| {
+                let beam = arrow::compute::cast(batch.column_by_name("beam").unwrap(), &DataType::Float64).unwrap();
+                let mut values: Vec<f64> = beam.as_primitive::<Float64Type>().values().to_vec();
+                values[3] = wrong;
+                let beam = arrow::compute::cast(&arrow::array::Float64Array::from(values), kind).unwrap();
+                let columns =
+                    ["time_s", "x_m", "y_m", "z_m"].map(|name| (name, batch.column_by_name(name).unwrap().clone()));
+                RecordBatch::try_from_iter(columns.into_iter().chain([("beam", beam)])).unwrap()
+            })
+            .collect();
+        let mut writer =
+            parquet::arrow::ArrowWriter::try_new(File::create(&path).unwrap(), batches[0].schema(), None).unwrap();
+        batches.iter().for_each(|batch| writer.write(batch).unwrap());
+        writer.close().unwrap();
+        std::fs::copy(folder.path().join("scans.poses.csv"), folder.path().join("beams.poses.csv")).unwrap();
+        refusal(&path, &scenario)
+    };
+    for (kind, wrong, expected) in [
+        (DataType::Int32, -1.0, "row 3 has `beam` = -1, but a whole number from 0 to 65,535, column"),
+        (DataType::Int64, 70_000.0, "row 3 has `beam` = 70000, but"),
+        (DataType::Float64, 2.5, "row 3 has `beam` = 2.5, but"),
+    ] {
+        let text = beams(&kind, wrong);
+        assert!(text.contains(expected), "{text}");
+    }
+}
+
 /// A value of a message in CDR, appended at a multiple of its size.
 fn put(bytes: &mut Vec<u8>, value: &[u8]) {
     while !bytes.len().is_multiple_of(value.len()) {
@@ -299,6 +374,18 @@ fn the_messages_of_ros_2_give_the_tracks_of_the_table() {
     assert!(text.contains("no sensor_msgs/msg/PointCloud2 in CDR: it ends before"), "{text}");
     let text = changed(3, &|data| data.truncate(90));
     assert!(text.contains("topic /odom, message 3") && text.contains("nav_msgs/msg/Odometry"), "{text}");
+    // The orientation lies before the covariance, the twist and its covariance.
+    let text = changed(3, &|data| {
+        let at = data.len() - 36 * 8 - 6 * 8 - 36 * 8 - 4 * 8;
+        data[at..at + 32].fill(0);
+    });
+    assert!(text.contains("topic /odom, message 3") && text.contains("has the norm 0, but a rotation has 1"), "{text}");
+    let ros_1 = messages.iter().cloned().map(|message| (message.0, "sensor_msgs/PointCloud2", message.2, message.3));
+    let text = refused(&ros_1.collect::<Vec<_>>());
+    assert!(
+        text.contains("no message is a sensor_msgs/msg/PointCloud2: /odom holds sensor_msgs/PointCloud2"),
+        "{text}"
+    );
     let without_poses: Vec<_> = messages.iter().filter(|message| message.1 == POINTS).cloned().collect();
     let text = refused_with(&without_poses, 6);
     assert!(
@@ -418,6 +505,16 @@ fn what_is_wrong_with_a_recording_is_named_with_its_place_and_what_is_allowed() 
     };
     let cases: Vec<(&str, Vec<u8>, &str)> = vec![
         ("scan-00.pcd", replaced("scan-00.pcd", "FIELDS x ", "FIELDS u "), "no field `x`, only u, y, z"),
+        (
+            "scan-00.pcd",
+            replaced("scan-00.pcd", "FIELDS x y z ", "FIELDS x y y "),
+            "scan-00.pcd: the field `y` is there twice; one is needed",
+        ),
+        (
+            "poses.csv",
+            replaced("poses.csv", "x_m,y_m", "x_m,x_m"),
+            "poses.csv, line 1: the column `x_m` is there twice; one is needed",
+        ),
         ("scan-00.pcd", replaced("scan-00.pcd", "DATA binary", "DATA zip"), "`zip` is unknown; `ascii`, `binary` and"),
         ("scan-00.pcd", good("scan-00.pcd")[..900].to_vec(), "have "),
         (

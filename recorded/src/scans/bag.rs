@@ -149,6 +149,12 @@ impl BagRecording {
             Some(topic) => Some(Poses::new(origin.at(format_args!("topic {topic}")), poses)?),
             None => None,
         };
+        if topics.is_empty() {
+            let of_topic = |channel: &Channel| format!("{} holds {}", channel.topic, channel.message);
+            let others: Vec<String> = messages.channels.values().map(of_topic).collect();
+            let others = if others.is_empty() { String::new() } else { format!(": {}", others.join(", ")) };
+            return Err(origin.error(ScanFileProblem::NoClouds(others)));
+        }
         let sensors = sensors(&topics, options).map_err(|problem| origin.error(problem))?;
         Ok(Self { messages: Messages::open(path)?, poses, sensors })
     }

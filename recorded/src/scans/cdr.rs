@@ -13,6 +13,8 @@ const ENCAPSULATION: usize = 4;
 const LITTLE_ENDIAN: [u8; 2] = [0, 1];
 /// Representation of big-endian CDR.
 const BIG_ENDIAN: [u8; 2] = [0, 0];
+/// Difference up to which the norm of a rotation is 1 (assumption): rounding to three digits.
+const UNIT_TOLERANCE: f64 = 0.01;
 /// Number of elements of a covariance matrix.
 const COVARIANCE: usize = 36;
 
@@ -141,13 +143,19 @@ pub(super) fn point_cloud(bytes: &[u8]) -> Result<(Time, Cloud), ScanFileProblem
 
 /// Returns the pose of an `Odometry`.
 pub(super) fn odometry(bytes: &[u8]) -> Result<Pose, ScanFileProblem> {
-    let mut cdr = Cdr::new(bytes, "nav_msgs/msg/Odometry")?;
+    const MESSAGE: &str = "nav_msgs/msg/Odometry";
+    let mut cdr = Cdr::new(bytes, MESSAGE)?;
     let (time, _) = cdr.header()?;
     cdr.string("child_frame_id")?;
     let mut numbers = |what| Ok::<_, ScanFileProblem>([cdr.f64(what)?, cdr.f64(what)?, cdr.f64(what)?]);
     let [x_m, y_m, _] = numbers("pose.pose.position")?;
     let [x, y, z] = numbers("pose.pose.orientation")?;
     let w = cdr.f64("pose.pose.orientation")?;
+    let norm = (x * x + y * y + z * z + w * w).sqrt();
+    if !((norm - 1.0).abs() <= UNIT_TOLERANCE) {
+        let reason = format!("`pose.pose.orientation` has the norm {norm}, but a rotation has 1");
+        return Err(ScanFileProblem::Message { message: MESSAGE, reason });
+    }
     cdr.position = cdr.position.next_multiple_of(size_of::<f64>());
     cdr.take(COVARIANCE * size_of::<f64>(), "pose.covariance")?;
     let speed_mps = cdr.f64("twist.twist.linear.x")?;

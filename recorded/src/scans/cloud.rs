@@ -80,13 +80,19 @@ pub(super) struct Cloud {
     names: Vec<String>,
 }
 
-/// The fields that are read. A field with another name is ignored.
+/// The fields that are read. A field with another name is ignored, also if there are several.
 const READ: [&str; 9] = ["x", "y", "z", "intensity", "beam", "time", "timestamp", "offset_ns", "t"];
+
+/// The values of `beam`.
+pub(super) const BEAM: &str = "a whole number from 0 to 65,535, column · layers + layer,";
+/// The values of a time after the start of the sweep.
+pub(super) const OFFSET: &str = "a whole number of ns from 0 to 1,000,000,000, after the start of the sweep,";
 
 impl Cloud {
     /// Returns the points that lie in these bytes.
     pub(super) fn of_bytes(fields: &[Field], points: PointBytes<'_>) -> Result<Self, ScanFileProblem> {
         let PointBytes { bytes, count: points, stride } = points;
+        refuse_doubled(fields)?;
         let size = ScanFileProblem::Size { actual: bytes.len(), points, stride };
         if points.checked_mul(stride) != Some(bytes.len()) {
             return Err(size);
@@ -106,14 +112,15 @@ impl Cloud {
     }
 
     /// Returns the points whose values are listed point by point.
-    pub(super) fn of_rows(fields: &[Field], rows: &[Vec<f64>]) -> Self {
+    pub(super) fn of_rows(fields: &[Field], rows: &[Vec<f64>]) -> Result<Self, ScanFileProblem> {
+        refuse_doubled(fields)?;
         let read = fields.iter().enumerate().filter(|(_, field)| READ.contains(&&*field.name));
         let columns = read.map(|(index, field)| Column {
             name: field.name.clone(),
             number: field.number,
             values: rows.iter().map(|row| row[index]).collect(),
         });
-        Self { columns: columns.collect(), names: fields.iter().map(|field| field.name.clone()).collect() }
+        Ok(Self { columns: columns.collect(), names: fields.iter().map(|field| field.name.clone()).collect() })
     }
 
     fn column(&self, name: &str) -> Option<&Column> {
@@ -144,27 +151,39 @@ impl Cloud {
     }
 }
 
+/// Refuses two fields with the same name, if the field is read.
+fn refuse_doubled(fields: &[Field]) -> Result<(), ScanFileProblem> {
+    let doubled = READ.iter().find(|name| fields.iter().filter(|field| field.name == **name).count() > 1);
+    match doubled {
+        Some(name) => Err(ScanFileProblem::Twice { what: "the field", name: (*name).to_owned() }),
+        None => Ok(()),
+    }
+}
+
 #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
 fn single(column: &Column) -> Vec<f32> {
     column.values.iter().map(|value| *value as f32).collect()
 }
 
-fn whole(column: &Column, most: f64, what: &'static str) -> Result<(), ScanFileProblem> {
-    let is_wrong = |value: &&f64| !(**value >= 0.0 && **value <= most && value.fract() == 0.0);
-    match column.values.iter().find(is_wrong) {
-        Some(&value) => Err(ScanFileProblem::OutOfRange { value, allowed: what }),
+fn whole(column: &Column, most: f64, needed: &'static str) -> Result<(), ScanFileProblem> {
+    let is_wrong = |value: &f64| !(*value >= 0.0 && *value <= most && value.fract() == 0.0);
+    match column.values.iter().position(is_wrong) {
+        Some(point) => {
+            let (name, value) = (&column.name, column.values[point]);
+            Err(ScanFileProblem::Points(format!("point {point} has `{name}` = {value}, but {needed} is needed")))
+        }
         None => Ok(()),
     }
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
 fn beams(column: &Column) -> Result<Vec<u16>, ScanFileProblem> {
-    whole(column, f64::from(u16::MAX), "a whole number of a beam, column · layers + layer, from 0 to 65,535,")?;
+    whole(column, f64::from(u16::MAX), BEAM)?;
     Ok(column.values.iter().map(|value| *value as u16).collect())
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
 fn offsets(column: &Column) -> Result<Vec<u32>, ScanFileProblem> {
-    whole(column, NS_PER_S, "a time after the start of the sweep from 0 to 1,000,000,000 whole ns")?;
+    whole(column, NS_PER_S, OFFSET)?;
     Ok(column.values.iter().map(|value| *value as u32).collect())
 }

@@ -108,6 +108,14 @@ pub enum ScanFileProblem {
         /// All columns that are needed.
         needed: String,
     },
+    /// A table or a point has two columns or fields of the same name, or a header two lines.
+    #[error("{what} `{name}` is there twice; one is needed")]
+    Twice {
+        /// What is there twice, such as `the column`.
+        what: &'static str,
+        /// Its name.
+        name: String,
+    },
     /// A row has too few or too many fields, or is not text.
     #[error("{0}")]
     Csv(String),
@@ -161,6 +169,18 @@ pub enum ScanFileProblem {
         /// The type that is needed.
         needed: &'static str,
     },
+    /// A column of a table has a value that its quantity cannot have.
+    #[error("row {row} has `{name}` = {value}, but {needed} is needed")]
+    Value {
+        /// The row, from 0.
+        row: usize,
+        /// The column.
+        name: &'static str,
+        /// The value.
+        value: String,
+        /// What is needed.
+        needed: &'static str,
+    },
     /// A column of a table has a null.
     #[error("row {row} has no value in the column `{name}`")]
     Null {
@@ -202,6 +222,12 @@ pub enum ScanFileProblem {
     /// An MCAP file cannot be read.
     #[error("the MCAP file cannot be read: {0}")]
     Mcap(String),
+    /// An MCAP file has no point clouds.
+    #[error("no message is a sensor_msgs/msg/PointCloud2{0}")]
+    NoClouds(
+        /// The other topics and their types, behind a colon, or nothing.
+        String,
+    ),
     /// A topic belongs to no LiDAR, or two topics to one.
     #[error(
         "the topics {topics} hold point clouds, and the LiDARs are {lidars}: with one of each they belong together; else \
@@ -229,6 +255,18 @@ pub enum ScanFileProblem {
         first_s: f64,
         /// Time of the last pose (s).
         last_s: f64,
+    },
+    /// A pose lies beside the road of the scenario.
+    #[error(
+        "`d_m` is {d_m} at {time_s} s, which is beside the road of the scenario: {} to {} m is allowed", allowed_m[0], allowed_m[1]
+    )]
+    BesideRoad {
+        /// The time (s).
+        time_s: f64,
+        /// The place across the road (m).
+        d_m: f64,
+        /// The range that is allowed (m).
+        allowed_m: [f64; 2],
     },
     /// The poses contradict each other.
     #[error("{0}")]

@@ -7,8 +7,8 @@ use std::path::Path;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::error::{Origin, ScanFileError, ScanFileProblem};
-use super::poses::{Mover, Pose, Poses, check_motion};
-use super::text_table::{TableFormat, read_table};
+use super::poses::{Mover, Pose, Poses, WrongMotion, check_motion};
+use super::text_table::{TableFormat, TableRow, read_table};
 
 /// Longest time between two labels of a vehicle between which it is interpolated (s).
 const LONGEST_GAP: Time = Time::from_ms(500);
@@ -53,7 +53,7 @@ impl Labels {
     /// of a vehicle contradict its path.
     pub fn read(path: &Path, poses: &Poses) -> Result<Self, ScanFileError> {
         let rows = read_table(path, FORMAT)?;
-        let mut vehicles: BTreeMap<String, Vec<Label>> = BTreeMap::new();
+        let mut vehicles: BTreeMap<String, (Vec<Label>, Vec<&TableRow>)> = BTreeMap::new();
         for row in &rows {
             let id = row.needed_text(1)?;
             let class = row.needed_text(2)?;
@@ -76,7 +76,7 @@ impl Labels {
                     within(8, 0.1, 5.0, "a width from 0.1 to 5 m")?,
                 ],
             };
-            let of_vehicle = vehicles.entry(id.to_owned()).or_default();
+            let (of_vehicle, lines) = vehicles.entry(id.to_owned()).or_default();
             if let Some(previous) = of_vehicle.last().filter(|previous| previous.time >= label.time) {
                 return Err(row.place(0).error(ScanFileProblem::TimeGoesBack {
                     time_s: label.time.s(),
@@ -85,11 +85,15 @@ impl Labels {
                 }));
             }
             of_vehicle.push(label);
+            lines.push(row);
         }
-        for (name, labels) in &vehicles {
-            check(name, labels, poses).map_err(|problem| Origin::file(path).error(problem))?;
+        for (name, (labels, lines)) in &vehicles {
+            check(name, labels, poses).map_err(|wrong| match wrong {
+                WrongMotion::All(problem) => Origin::file(path).error(problem),
+                WrongMotion::Jump { pose, quantity, problem } => lines[pose].place(3 + quantity).error(problem),
+            })?;
         }
-        let (names, of_vehicles) = vehicles.into_iter().unzip();
+        let (names, of_vehicles) = vehicles.into_iter().map(|(name, (labels, _))| (name, labels)).unzip();
         Ok(Self { names, of_vehicles })
     }
 
@@ -114,18 +118,22 @@ impl Labels {
 }
 
 /// Refuses the speeds and headings of a vehicle that contradict its path.
-fn check(name: &str, labels: &[Label], poses: &Poses) -> Result<(), ScanFileProblem> {
+fn check(name: &str, labels: &[Label], poses: &Poses) -> Result<(), WrongMotion> {
     let pose = |label: &Label| {
         let (at_m, yaw_rad) = poses.unmoved(label.time, label.at_m)?;
         let yaw_rad = yaw_rad + label.heading_rad;
         Some(Pose { time: label.time, at_m, yaw_rad, speed_mps: label.speed_mps, ..Pose::default() })
     };
-    let path: Vec<Pose> = labels.iter().filter_map(pose).collect();
+    let (numbers, path): (Vec<usize>, Vec<Pose>) =
+        labels.iter().enumerate().filter_map(|(number, label)| Some((number, pose(label)?))).unzip();
     let needed = [
         "m in the ego's frame (x ahead, y to the left) and m/s over ground are needed",
         "they are in rad relative to the ego's, counter-clockwise",
     ];
-    check_motion(Mover { name: &format!("`{name}`"), needed }, &path)
+    check_motion(Mover { name: &format!("`{name}`"), needed, turns: false }, &path).map_err(|wrong| match wrong {
+        WrongMotion::Jump { pose, quantity, problem } => WrongMotion::Jump { pose: numbers[pose], quantity, problem },
+        all @ WrongMotion::All(_) => all,
+    })
 }
 
 /// Returns the label at a time, interpolated between two that are near enough.

@@ -117,7 +117,7 @@ struct Header {
 fn parse(bytes: &[u8]) -> Result<Cloud, ScanFileProblem> {
     let wrong = |message: String| ScanFileProblem::PcdHeader(message);
     let mut header = Header::default();
-    let mut rest = bytes;
+    let (mut rest, mut keys) = (bytes, HashSet::new());
     let format = loop {
         let Some(end) = rest.iter().position(|byte| *byte == b'\n') else {
             return Err(wrong("there is no line `DATA`".to_owned()));
@@ -127,6 +127,9 @@ fn parse(bytes: &[u8]) -> Result<Cloud, ScanFileProblem> {
         let line = std::str::from_utf8(line).map_err(|_| wrong("a line before `DATA` is not text".to_owned()))?.trim();
         let mut words = line.split_ascii_whitespace();
         let Some(key) = words.next().filter(|key| !key.starts_with('#')) else { continue };
+        if !keys.insert(key.to_owned()) {
+            return Err(ScanFileProblem::Twice { what: "the header line", name: key.to_owned() });
+        }
         let values: Vec<&str> = words.collect();
         let numbers = || values.iter().map(|word| word.parse::<usize>()).collect::<Result<Vec<_>, _>>();
         let whole = || numbers().map_err(|_| wrong(format!("`{line}` needs whole numbers")));
@@ -248,7 +251,7 @@ fn ascii(fields: &[Field], points: usize, text: &[u8]) -> Result<Cloud, ScanFile
         let message = format!("there are {} points, but the header states {points}", rows.len());
         return Err(ScanFileProblem::Points(message));
     }
-    Ok(Cloud::of_rows(fields, &rows))
+    Cloud::of_rows(fields, &rows)
 }
 
 /// Decompresses points. The values lie field by field in the compressed data, and point by point in
@@ -330,6 +333,9 @@ mod tests {
             (HEADER.to_owned(), "DATA binary_big\n", "`binary_big` is unknown; `ascii`, `binary` and"),
             (HEADER.to_owned(), "DATA binary_compressed\n", "they end too early"),
             (HEADER.to_owned(), "", "there is no line `DATA`"),
+            (HEADER.replace("x y z", "x x z"), two, "the field `x` is there twice; one is needed"),
+            (HEADER.replace("x y z", "x x z"), "DATA binary\n", "the field `x` is there twice; one is needed"),
+            (HEADER.replace("HEIGHT 1", "HEIGHT 1\nWIDTH 2"), two, "the header line `WIDTH` is there twice"),
         ] {
             let message = with(header, data);
             assert!(message.contains(expected), "{message} instead of {expected}");

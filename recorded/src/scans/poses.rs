@@ -9,6 +9,7 @@
 //! is the arc that has the mean curvature of the last 100 m of the ego's path, and the ego drives
 //! along it in the middle of its lane.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use closecall_traffic::{Road, Time, VehicleState, maths};
@@ -37,6 +38,25 @@ const MOST_RATIO: f64 = 1.5;
 /// Largest angle between heading and path in the median (rad; assumption). Angles of drift are
 /// smaller, and other conventions differ by a quarter of a turn.
 const MOST_BESIDE_RAD: f64 = 0.5;
+/// Factor of the distance that the speeds allow from which on a vehicle jumps (assumption), as between the ways by
+/// speeds and by places.
+const JUMP_FACTOR: f64 = 2.0;
+/// Distance beyond it (m; assumption): the noise of two places.
+const JUMP_M: f64 = 5.0;
+/// Yaw rate from which on the ego jumps to another heading (rad/s; assumption): some 1 rad/s at most in a bend of a
+/// town.
+const JUMP_RADPS: f64 = 3.0;
+/// Change of the heading beyond it (rad; assumption): the noise of two headings.
+const JUMP_RAD: f64 = 0.5;
+/// Share of the poses up to which jumps are errors of single poses, rather than of a unit (assumption).
+const FEW: f64 = 0.25;
+/// Highest speed (m/s), as in the answer of a perception program.
+const FASTEST_MPS: f64 = 150.0;
+/// Positions along the road, as a scenario allows them (m).
+const S_M: RangeInclusive<f64> = -10_000.0..=100_000.0;
+/// Largest distance of the ego's centre beside the lanes (m; assumption): an ego that has left them drives on the
+/// verge.
+const BESIDE_M: f64 = 10.0;
 /// A table of poses.
 const FORMAT: TableFormat = TableFormat {
     columns: &["time_s", "x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "s_m", "d_m", "heading_rad"],
@@ -83,10 +103,21 @@ pub(super) struct Mover<'a> {
     pub(super) name: &'a str,
     /// What is needed of speeds and places, and of headings.
     pub(super) needed: [&'a str; 2],
+    /// Whether its heading cannot jump, as the heading of a box that somebody has labelled can.
+    pub(super) turns: bool,
 }
 
-const EGO: Mover<'_> =
-    Mover { name: "the ego", needed: ["m/s and m are needed", "they are in rad, counter-clockwise from x to y"] };
+const EGO: Mover<'_> = Mover {
+    name: "the ego",
+    needed: ["m/s and m are needed", "they are in rad, counter-clockwise from x to y"],
+    turns: true,
+};
+/// The ego in its places on the road.
+const ON_ROAD: Mover<'_> = Mover {
+    name: "the ego",
+    needed: ["`s_m` and `d_m` are in m along and across the road", "`heading_rad` is in rad relative to the road"],
+    turns: true,
+};
 
 /// The poses of the ego, in order of time.
 #[derive(Clone, Debug)]
@@ -126,16 +157,15 @@ impl Poses {
                     }
                 },
             };
-            if !(pose.speed_mps >= 0.0) {
-                let problem = ScanFileProblem::OutOfRange { value: pose.speed_mps, allowed: "a speed of 0 or more" };
-                return Err(row.place(4).error(problem));
+            if let Some((column, value, allowed)) = pose.out_of_range() {
+                return Err(row.place(column).error(ScanFileProblem::OutOfRange { value, allowed }));
             }
             if let Some(previous) = poses.last().filter(|previous| previous.time >= pose.time) {
                 return Err(row.place(0).error(goes_back(pose.time, previous.time)));
             }
             poses.push(pose);
         }
-        Self::from_ordered(Origin::file(path), poses)
+        Self::from_ordered(Origin::file(path), poses, |pose, column| rows[pose].place(column))
     }
 
     /// Returns the poses of a recording.
@@ -150,11 +180,39 @@ impl Poses {
         if let Some(pair) = poses.windows(2).find(|pair| pair[0].time >= pair[1].time) {
             return Err(origin.error(goes_back(pair[1].time, pair[0].time)));
         }
-        Self::from_ordered(origin, poses)
+        let of_message = |pose: usize, column: usize| {
+            let message = format!("{}, message {pose}, `{}`", origin.place, FORMAT.columns[column]);
+            origin.at(message.trim_start_matches(", "))
+        };
+        if let Some((pose, (column, value, allowed))) =
+            poses.iter().enumerate().find_map(|(index, pose)| Some((index, pose.out_of_range()?)))
+        {
+            return Err(of_message(pose, column).error(ScanFileProblem::OutOfRange { value, allowed }));
+        }
+        Self::from_ordered(origin.clone(), poses, of_message)
     }
 
-    fn from_ordered(origin: Origin, poses: Vec<Pose>) -> Result<Self, ScanFileError> {
-        check_motion(EGO, &poses).map_err(|problem| origin.error(problem))?;
+    /// `place` says where a column of a pose stands.
+    fn from_ordered(
+        origin: Origin,
+        poses: Vec<Pose>,
+        place: impl Fn(usize, usize) -> Origin,
+    ) -> Result<Self, ScanFileError> {
+        let of_motion = |columns: [usize; 3]| {
+            let (origin, place) = (&origin, &place);
+            move |wrong: WrongMotion| match wrong {
+                WrongMotion::All(problem) => origin.error(problem),
+                WrongMotion::Jump { pose, quantity, problem } => place(pose, columns[quantity]).error(problem),
+            }
+        };
+        check_motion(EGO, &poses).map_err(of_motion([1, 2, 3]))?;
+        let on_road = |pose: &Pose| {
+            let [s_m, d_m, heading_rad] = pose.on_road?;
+            Some(Pose { at_m: [s_m, d_m], yaw_rad: heading_rad, ..*pose })
+        };
+        if let Some(on_road) = poses.iter().map(on_road).collect::<Option<Vec<Pose>>>() {
+            check_motion(ON_ROAD, &on_road).map_err(of_motion([6, 7, 8]))?;
+        }
         let (mut yaw_rad, mut driven_m) = (Vec::with_capacity(poses.len()), Vec::with_capacity(poses.len()));
         for (index, pose) in poses.iter().enumerate() {
             match index.checked_sub(1) {
@@ -172,6 +230,21 @@ impl Poses {
             }
         }
         Ok(Self { origin, poses, yaw_rad, driven_m })
+    }
+
+    /// Refuses poses that are not on this road, if they state their place on a road.
+    ///
+    /// # Errors
+    /// [`ScanFileError`] with the first such pose.
+    pub fn check_on(&self, road: &Road) -> Result<(), ScanFileError> {
+        let [right_m, left_m] = [road.right_edge_m() - BESIDE_M, BESIDE_M];
+        let beside = |pose: &&Pose| pose.on_road.is_some_and(|[_, d_m, _]| !(right_m..=left_m).contains(&d_m));
+        match self.poses.iter().find(beside) {
+            Some(Pose { time, on_road: Some([_, d_m, _]), .. }) => Err(self
+                .origin
+                .error(ScanFileProblem::BesideRoad { time_s: time.s(), d_m: *d_m, allowed_m: [right_m, left_m] })),
+            _ => Ok(()),
+        }
     }
 
     /// Returns the time of the last pose.
@@ -256,9 +329,79 @@ impl Poses {
     }
 }
 
-/// Refuses speeds and headings that contradict the path. Their unit or their frame is another.
-pub(super) fn check_motion(mover: Mover<'_>, poses: &[Pose]) -> Result<(), ScanFileProblem> {
-    let Mover { name, needed } = mover;
+impl Pose {
+    /// Returns the column of a value that no vehicle has, the value, and what is allowed.
+    fn out_of_range(&self) -> Option<(usize, f64, &'static str)> {
+        let right_rad = std::f64::consts::FRAC_PI_2;
+        if !(0.0..=FASTEST_MPS).contains(&self.speed_mps) {
+            return Some((4, self.speed_mps, "a speed from 0 to 150 m/s"));
+        }
+        match self.on_road {
+            Some([s_m, ..]) if !S_M.contains(&s_m) => Some((6, s_m, "a position from -10,000 to 100,000 m")),
+            Some([.., heading_rad]) if !(-right_rad..=right_rad).contains(&heading_rad) => {
+                Some((8, heading_rad, "an angle from -π/2 to π/2 rad"))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// A contradiction in the motion of a vehicle.
+pub(super) enum WrongMotion {
+    /// In all of it: a unit or a frame is another.
+    All(ScanFileProblem),
+    /// From one pose to the next.
+    Jump {
+        /// The number of the later pose.
+        pose: usize,
+        /// The quantity that jumps: x, y or the heading.
+        quantity: usize,
+        /// The problem.
+        problem: ScanFileProblem,
+    },
+}
+
+/// Refuses speeds and headings that contradict the path, because their unit or their frame is another, and poses to
+/// which the vehicle jumps.
+pub(super) fn check_motion(mover: Mover<'_>, poses: &[Pose]) -> Result<(), WrongMotion> {
+    let mut jumps = (1..poses.len()).filter_map(|pose| jump(mover, poses, pose));
+    let first = jumps.next();
+    let number = usize::from(first.is_some()) + jumps.count();
+    let all = check_units(mover, poses).map_err(WrongMotion::All);
+    match first {
+        Some(first) if all.is_ok() || number as f64 <= FEW * poses.len() as f64 => Err(first),
+        _ => all,
+    }
+}
+
+/// Returns the jump from the previous pose to this one.
+fn jump(mover: Mover<'_>, poses: &[Pose], pose: usize) -> Option<WrongMotion> {
+    let [before, after] = [poses[pose - 1], poses[pose]];
+    let elapsed_s = (after.time - before.time).s();
+    let moved_m = [0, 1].map(|axis| after.at_m[axis] - before.at_m[axis]);
+    let distance_m = maths::hypot(moved_m[0], moved_m[1]);
+    let allowed_m = JUMP_FACTOR * before.speed_mps.abs().max(after.speed_mps.abs()) * elapsed_s + JUMP_M;
+    let name = mover.name;
+    if !(distance_m <= allowed_m) {
+        let text = format!(
+            "{name} moves {distance_m:.1} m in {elapsed_s:.3} s, but its speeds allow {allowed_m:.1} m at most, with {JUMP_M} m of noise"
+        );
+        let quantity = usize::from(moved_m[1].abs() > moved_m[0].abs());
+        return Some(WrongMotion::Jump { pose, quantity, problem: ScanFileProblem::Motion(text) });
+    }
+    let turn = std::f64::consts::TAU;
+    let turned_rad = after.yaw_rad - before.yaw_rad;
+    let turned_rad = (turned_rad - turn * (turned_rad / turn).round()).abs();
+    let allowed_rad = JUMP_RADPS * elapsed_s + JUMP_RAD;
+    (mover.turns && !(turned_rad <= allowed_rad)).then(|| {
+        let text =
+            format!("{name} turns by {turned_rad:.1} rad in {elapsed_s:.3} s, but {allowed_rad:.1} rad is allowed");
+        WrongMotion::Jump { pose, quantity: 2, problem: ScanFileProblem::Motion(text) }
+    })
+}
+
+fn check_units(mover: Mover<'_>, poses: &[Pose]) -> Result<(), ScanFileProblem> {
+    let Mover { name, needed, .. } = mover;
     let (mut path_m, mut by_speed_m, mut beside_rad, mut first) = (0.0_f64, 0.0_f64, Vec::new(), 0);
     for (last, pose) in poses.iter().enumerate() {
         let elapsed = pose.time - poses[first].time;
@@ -367,6 +510,66 @@ mod tests {
         assert_eq!(error_of(&|pose| pose.yaw_rad += std::f64::consts::TAU), "");
         assert_eq!(error_of(&|pose| pose.speed_mps *= 1.2), "");
         assert_eq!(error_of(&|pose| (pose.at_m, pose.speed_mps) = ([pose.at_m[0] % 3.0, 0.0], 0.0)), "");
+    }
+
+    #[test]
+    fn a_pose_to_which_the_ego_jumps_is_named_with_its_quantity() {
+        let on_map = || {
+            let mut poses = bend().poses;
+            poses.iter_mut().for_each(|pose| pose.on_road = Some([500.0 + 30.0 * pose.time.s(), -5.625, 0.0]));
+            poses
+        };
+        let error_of = |poses: Vec<Pose>| {
+            Poses::new(Origin::file("bend"), poses).err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        assert_eq!(error_of(on_map()), "");
+        let of_pose = |change: &dyn Fn(&mut Pose)| {
+            let mut poses = on_map();
+            change(&mut poses[57]);
+            error_of(poses)
+        };
+        for (change, expected) in [
+            (&(|pose: &mut Pose| pose.at_m[0] = -500.0) as &dyn Fn(&mut Pose), "message 57, `x_m`: the ego moves"),
+            (&|pose| pose.at_m[1] = -500.0, "message 57, `y_m`: the ego moves"),
+            (&|pose| pose.yaw_rad += 2.0, "message 57, `yaw_rad`: the ego turns by 2.0 rad in 0.100 s, but 0.8 rad"),
+            (&|pose| pose.on_road = Some([-500.0, -5.625, 0.0]), "message 57, `s_m`: the ego moves"),
+            (
+                &|pose| pose.on_road = Some([671.0, -500.0, 0.0]),
+                "message 57, `d_m`: the ego moves 494.4 m in 0.100 s, but",
+            ),
+            (&|pose| pose.on_road = Some([671.0, -5.625, 1.2]), "message 57, `heading_rad`: the ego turns by 1.2 rad"),
+            (
+                &|pose| pose.on_road = Some([671.0, -5.625, 3.1]),
+                "`heading_rad`: 3.1 is out of range: an angle from -π/2",
+            ),
+            (
+                &|pose| pose.on_road = Some([-2e4, -5.625, 0.0]),
+                "`s_m`: -20000 is out of range: a position from -10,000",
+            ),
+            (&|pose| pose.speed_mps = 151.0, "`speed_mps`: 151 is out of range: a speed from 0 to 150 m/s is needed"),
+        ] {
+            let error = of_pose(change);
+            assert!(error.contains(expected), "{error}");
+        }
+        // Where every pose is wrong, the unit is.
+        let all = |change: &dyn Fn(&mut Pose)| {
+            let mut poses = on_map();
+            poses.iter_mut().for_each(change);
+            error_of(poses)
+        };
+        let error = all(&|pose| pose.on_road = Some([500.0, -5.625, 0.0]));
+        assert!(error.contains("0 m by its places: `s_m` and `d_m` are in m along"), "{error}");
+        // A pose beside the road is beside each road that is narrower.
+        let poses = |d_m: f64| {
+            let mut poses = on_map();
+            poses.iter_mut().for_each(|pose| pose.on_road = Some([500.0 + 30.0 * pose.time.s(), d_m, 0.0]));
+            Poses::new(Origin::file("bend"), poses).unwrap().check_on(&Road::straight(3))
+        };
+        assert!(poses(-21.0).is_ok() && poses(9.0).is_ok());
+        for d_m in [-500.0, -22.0, 11.0] {
+            let error = poses(d_m).unwrap_err().to_string();
+            assert!(error.contains("beside the road of the scenario: -21.25 to 10 m is allowed"), "{error}");
+        }
     }
 
     #[test]

@@ -5,12 +5,18 @@ use std::path::Path;
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float32Type, Float64Type, UInt16Type, UInt32Type};
+use arrow::util::display::array_value_to_string;
 use closecall_sensors::lidar::{PointTimes, RecordedPoints};
 use closecall_traffic::{Time, input};
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
+use super::cloud::{BEAM, OFFSET};
 use super::error::{Origin, ScanFileError, ScanFileProblem};
 use super::options::{ScanOptions, TakenScan, mirror_side};
+
+/// The columns that are read. A column with another name is ignored.
+const READ: [&str; 10] =
+    ["sensor", "time_s", "mirror_side", "sensor_x_m", "x_m", "y_m", "z_m", "intensity", "beam", "offset_ns"];
 
 /// The table, with the scan whose rows are being collected.
 pub(super) struct TableRecording {
@@ -49,11 +55,16 @@ impl TableRecording {
     pub(super) fn open(path: &Path) -> Result<Self, ScanFileError> {
         let origin = Origin::file(path);
         let file = input::open(path).map_err(|error| origin.error(error))?;
-        let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(ParquetRecordBatchReaderBuilder::build);
         let damaged = |error: parquet::errors::ParquetError| {
             origin.error(ScanFileProblem::Points(format!("it cannot be read as a table: {error}")))
         };
-        Ok(Self { reader: reader.map_err(damaged)?, origin, batch: None, row: 0, rows_before: 0 })
+        let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(damaged)?;
+        let fields = builder.schema().fields();
+        if let Some(name) = READ.iter().find(|name| fields.iter().filter(|field| field.name() == *name).count() > 1) {
+            return Err(origin.error(ScanFileProblem::Twice { what: "the column", name: (*name).to_owned() }));
+        }
+        let reader = builder.build().map_err(damaged)?;
+        Ok(Self { reader, origin, batch: None, row: 0, rows_before: 0 })
     }
 
     pub(super) fn next_scan(&mut self, options: &ScanOptions) -> Result<Option<TakenScan>, ScanFileError> {
@@ -122,13 +133,22 @@ impl Rows {
         };
         let as_type = |column: &dyn Array, kind: DataType, name: &'static str, needed: &'static str| {
             let wrong = || ScanFileProblem::ColumnType { name, actual: column.data_type().to_string(), needed };
-            // A cast that fails for a value gives a null.
             let values = cast(column, &kind).map_err(|_| wrong())?;
-            if values.null_count() > column.null_count() {
-                return Err(wrong());
-            }
-            match (0..values.len()).find(|row| values.is_null(*row)) {
-                Some(row) => Err(ScanFileProblem::Null { row: before + row, name }),
+            // A cast that fails for a value gives a null, and a cast to a whole number cuts off decimals.
+            let decimals = match column.data_type().is_floating() && kind.is_integer() {
+                true => Some(cast(column, &DataType::Float64).map_err(|_| wrong())?),
+                false => None,
+            };
+            let has_decimals = |row: usize| {
+                let exact = decimals.as_ref().map(|values| values.as_primitive::<Float64Type>().value(row));
+                exact.is_some_and(|value| value.fract() != 0.0)
+            };
+            match (0..values.len()).find(|row| values.is_null(*row) || has_decimals(*row)) {
+                Some(row) if column.is_null(row) => Err(ScanFileProblem::Null { row: before + row, name }),
+                Some(row) => {
+                    let value = array_value_to_string(column, row).map_err(|_| wrong())?;
+                    Err(ScanFileProblem::Value { row: before + row, name, value, needed })
+                }
                 None => Ok(values),
             }
         };
@@ -160,11 +180,11 @@ impl Rows {
             names.into_iter().enumerate().map(name).collect::<Result<Vec<_>, _>>()
         });
         let beam = batch.column_by_name("beam").map(|column| {
-            let values = as_type(column, DataType::UInt16, "beam", "a whole number from 0 to 65,535")?;
+            let values = as_type(column, DataType::UInt16, "beam", BEAM)?;
             Ok::<_, ScanFileProblem>(values.as_primitive::<UInt16Type>().values().to_vec())
         });
         let offset_ns = batch.column_by_name("offset_ns").map(|column| {
-            let values = as_type(column, DataType::UInt32, "offset_ns", "a whole number of nanoseconds")?;
+            let values = as_type(column, DataType::UInt32, "offset_ns", OFFSET)?;
             Ok::<_, ScanFileProblem>(values.as_primitive::<UInt32Type>().values().to_vec())
         });
         Ok(Self {

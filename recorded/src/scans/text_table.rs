@@ -54,7 +54,12 @@ pub(super) fn read_table(path: &Path, format: TableFormat) -> Result<Vec<TableRo
         origin.at(place).error(problem)
     };
     let header = reader.headers().map_err(of_csv)?.clone();
-    let at = |name: &str| header.iter().position(|column| column.trim_start_matches('\u{feff}') == name);
+    let at = |name: &str| header.iter().position(|column| bare(column) == name);
+    let doubled = columns.iter().find(|name| header.iter().filter(|column| bare(column) == **name).count() > 1);
+    if let Some(name) = doubled {
+        let problem = ScanFileProblem::Twice { what: "the column", name: (*name).to_owned() };
+        return Err(origin.at("line 1").error(problem));
+    }
     let indices: Vec<Option<usize>> = columns.iter().map(|name| at(name)).collect();
     if let Some(missing) = indices[..needed].iter().position(Option::is_none) {
         let problem = ScanFileProblem::MissingColumn { name: columns[missing], needed: list() };
@@ -71,6 +76,11 @@ pub(super) fn read_table(path: &Path, format: TableFormat) -> Result<Vec<TableRo
         rows.push(TableRow { origin: origin.clone(), line, columns, fields: indices.iter().map(field).collect() });
     }
     if rows.is_empty() { Err(origin.error(ScanFileProblem::NoRows)) } else { Ok(rows) }
+}
+
+/// Returns the name of a column without the mark of UTF-8 before the first one.
+fn bare(column: &str) -> &str {
+    column.trim_start_matches('\u{feff}')
 }
 
 impl TableRow {
