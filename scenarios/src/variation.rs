@@ -37,8 +37,8 @@ impl Scenario {
         Self { actors, ego: last - self.ego, ..self.clone() }
     }
 
-    /// Returns the same scenario whose LiDARs cluster each scan a second time, by
-    /// `linfa-clustering`.
+    /// Returns the same scenario whose LiDARs cluster each scan a second time, by another
+    /// DBSCAN.
     #[must_use]
     pub fn with_clustering_check(&self, check: ClusteringCheck) -> Self {
         Self { sensors: self.sensors.with_clustering_check(check), ..self.clone() }

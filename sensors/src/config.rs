@@ -61,8 +61,8 @@ impl SensorMode {
 pub struct SensorsConfig {
     /// Level of detail at which the sensors are simulated; `full` by default.
     pub mode: Choice<SensorMode>,
-    /// The implementation of DBSCAN that clusters the points of all LiDARs; `grid` by default. The
-    /// clusters are the same.
+    /// The implementation of DBSCAN that clusters the points of all LiDARs; `linfa` by default.
+    /// The clusters are the same.
     #[serde(skip_serializing_if = "is_default_method")]
     pub clustering: Choice<ClusteringMethod>,
     /// Factor of the radii of DBSCAN, 0.4 to 2.5. With 1 they are 0.8 m along and 0.5 m across the
@@ -365,8 +365,8 @@ impl Sensors {
         Self { full, ..self }
     }
 
-    /// Returns the same sensors whose LiDARs cluster each scan a second time, by
-    /// `linfa-clustering`. A run ends with [`SensorError::Clusterings`] if a label differs.
+    /// Returns the same sensors whose LiDARs cluster each scan a second time, by the
+    /// other implementation. A run ends with [`SensorError::Clusterings`] if a label differs.
     #[must_use]
     pub fn with_clustering_check(self, check: ClusteringCheck) -> Self {
         self.with_lidars(|lidar| Lidar { clustering_check: Some(check), ..lidar })
@@ -611,9 +611,9 @@ mod tests {
             let full = check(text).unwrap().full_model();
             full.rear_lidars().chain(full.front_lidar).map(|lidar| lidar.clustering.method).collect()
         };
-        assert_eq!(method(""), [ClusteringMethod::Grid]);
-        let several = "clustering = \"linfa\"\nfront-lidar = {}\nadditional-rear-lidars = [{ name = \"left\" }]";
-        assert_eq!(method(several), [ClusteringMethod::Linfa; 3]);
+        assert_eq!(method(""), [ClusteringMethod::Linfa]);
+        let several = "clustering = \"grid\"\nfront-lidar = {}\nadditional-rear-lidars = [{ name = \"left\" }]";
+        assert_eq!(method(several), [ClusteringMethod::Grid; 3]);
         assert!(toml::from_str::<SensorsConfig>("clustering = \"k-means\"").is_err());
         let model = |text: &str| check(text).unwrap().full_model().rear_lidar.clustering;
         assert_eq!(model(""), ClusteringModel::default());

@@ -15,7 +15,7 @@ pub enum SensorError {
     },
     /// Two implementations of DBSCAN give different clusters, in a run that compares them. The
     /// boxes of that scan are not used.
-    #[error("{different} of {points} clustered points have another label by linfa-clustering at {time}")]
+    #[error("{different} of {points} clustered points have another label by another DBSCAN at {time}")]
     Clusterings {
         /// Number of points whose labels differ.
         different: usize,

@@ -7,7 +7,7 @@ use std::path::Path;
 use closecall_scenarios::source::expand;
 use closecall_scenarios::{Scenario, ScenarioError, ScenarioFile, Setting};
 use closecall_sensors::SensorMode;
-use closecall_sensors::lidar::ClusteredPoints;
+use closecall_sensors::lidar::{ClusteredPoints, ClusteringMethod};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_testing::dbscan_by_definition;
@@ -42,7 +42,8 @@ impl Observer for Comparison {
             self.scans += 1;
             self.points += points.len();
             self.different += usize::from(labels != expected);
-            self.different += usize::from(ClusteredPoints::by_linfa(points).labels != expected);
+            let own = ClusteredPoints::by(ClusteringMethod::Grid, points);
+            self.different += usize::from(own.labels != expected);
         }
     }
 }

@@ -14,7 +14,7 @@ pub enum Invariance {
     Threads,
     /// Left and right are exchanged.
     Mirror,
-    /// The points of the LiDARs are clustered a second time, by `linfa-clustering`.
+    /// The points of the LiDARs are clustered a second time, by another DBSCAN.
     Clustering,
     /// The time step is halved; broken if that run ends in an error.
     HalfStep,
@@ -50,7 +50,7 @@ impl Invariance {
             Self::ActorOrder => "another order of the actors gave another outcome",
             Self::Threads => "another number of threads gave another outcome",
             Self::Mirror => "the mirrored world gave an outcome that is not the mirror image",
-            Self::Clustering => "linfa-clustering gave other clusters of the LiDAR's points",
+            Self::Clustering => "another DBSCAN gave other clusters of the LiDAR's points",
             Self::HalfStep => "half the time step ended in an error",
         }
     }

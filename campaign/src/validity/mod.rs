@@ -8,7 +8,7 @@
 //! | threads     | the run uses a new thread besides the campaign's own | the same bits                           |
 //! | repetition  | nothing; a new process, if the controller has one    | the same bits                           |
 //! | mirror      | left and right are exchanged, object-level sensors   | the mirror image of the outcome         |
-//! | clustering  | `linfa-clustering` clusters each scan a second time  | the same clusters                       |
+//! | clustering  | another DBSCAN clusters each scan a second time      | the same clusters                       |
 //!
 //! The mirror check is skipped on a curved road, which has no mirror image: positions along the
 //! road are measured on its left edge.

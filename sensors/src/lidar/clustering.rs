@@ -20,9 +20,9 @@
 //! DBSCAN would keep apart. It may split a cluster that is connected only by gaps of more than 0.43
 //! of the radius, which is the radius less two diagonals of a cell.
 //!
-//! DBSCAN comes from [`dbscan`](super::dbscan), or from `linfa-clustering` with the search for
-//! neighbours in [`neighbours`](super::neighbours). Both give the same labels. A point that lies
-//! exactly at the radius is a neighbour.
+//! DBSCAN comes from `linfa-clustering` with the search for neighbours in
+//! [`neighbours`](super::neighbours), or from [`dbscan`](super::dbscan). Both give the same labels.
+//! A point that lies exactly at the radius is a neighbour.
 
 use std::ops::RangeInclusive;
 
@@ -67,15 +67,14 @@ const GRID_CELLS: usize = (CELLS_ALONG / CELLS_IN_RADIUS + 1) * (CELLS_ACROSS / 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClusteringMethod {
-    /// Closecall's own, over a grid: the faster one. The validity checks of a campaign compare it
-    /// with the other.
-    #[default]
-    Grid,
     /// The one of `linfa-clustering`, with Closecall's grid as its index.
+    #[default]
     Linfa,
+    /// Closecall's own, over a grid: the faster one.
+    Grid,
 }
 
-/// A second clustering of each scan by `linfa-clustering`, whose labels must be the same.
+/// A second clustering of each scan by the other implementation, whose labels must be the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClusteringCheck {
     /// Number of core points of the second clustering, if a difference is planted.
@@ -125,9 +124,12 @@ impl ClusteredPoints {
     /// Radius within which points are neighbours.
     pub const RADIUS: f64 = RADIUS;
 
-    /// Clusters points with `linfa-clustering`.
-    pub fn by_linfa(points: Vec<[f64; 2]>) -> Self {
-        let labels = linfa_dbscan(&points, RADIUS, CORE_POINTS).into_raw_vec_and_offset().0;
+    /// Clusters points with one of the implementations.
+    pub fn by(method: ClusteringMethod, points: Vec<[f64; 2]>) -> Self {
+        let labels = match method {
+            ClusteringMethod::Linfa => linfa_dbscan(&points, RADIUS, CORE_POINTS).to_vec(),
+            ClusteringMethod::Grid => grid_dbscan(&points, RADIUS, CORE_POINTS),
+        };
         Self { points, labels }
     }
 }
@@ -201,14 +203,17 @@ impl Clustering {
         }
     }
 
-    /// Clusters the points of the latest run once more with `linfa-clustering`.
+    /// Clusters the points of the latest run once more, with the other implementation.
     ///
     /// # Errors
     /// [`SensorError::Clusterings`] if a label differs. The clusters of the latest run remain.
     pub(crate) fn compare(&self, check: ClusteringCheck, time: Time) -> Result<(), SensorError> {
         let (points, labels) = self.rows();
         let core_points = check.core_points.unwrap_or(self.model.core_points);
-        let again = linfa_dbscan(points, self.model.radius, core_points);
+        let again = match self.model.method {
+            ClusteringMethod::Linfa => grid_dbscan(points, self.model.radius, core_points),
+            ClusteringMethod::Grid => linfa_dbscan(points, self.model.radius, core_points).to_vec(),
+        };
         let different = labels.iter().zip(&again).filter(|(label, again)| label != again).count();
         if different > 0 {
             return Err(SensorError::Clusterings { different, points: points.len(), time });
@@ -304,6 +309,13 @@ fn linfa_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Array1<
     params.check().expect("two core points or more, a radius above 0").transform(&ArrayView2::from(points))
 }
 
+/// Returns the cluster of each point by Closecall's own DBSCAN, `None` for noise.
+fn grid_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Vec<Option<usize>> {
+    let mut grid = GridDbscan::default();
+    grid.run(points, radius, core_points);
+    grid.labels.iter().map(|label| label.map(|label| label as usize)).collect()
+}
+
 /// Returns the coordinates (X, Y) of a candidate in the stretched plane.
 fn to_stretched_plane(candidate: &Candidate) -> [f32; 2] {
     let along = maths::ln_1p(ALONG_GAIN / ALONG_M * candidate.back_m) / ALONG_GAIN;
@@ -334,24 +346,17 @@ mod tests {
         expected: Vec<i64>,
     }
 
-    fn indices(grid: &GridDbscan) -> Vec<Option<usize>> {
-        grid.labels.iter().map(|label| label.map(|label| label as usize)).collect()
-    }
-
-    fn grid_dbscan(points: &[[f64; 2]], radius: f64, core_points: usize) -> Vec<Option<usize>> {
-        let mut grid = GridDbscan::default();
-        grid.run(points, radius, core_points);
-        indices(&grid)
-    }
-
     #[test]
     fn a_planted_difference_between_the_clusterings_is_an_error() {
-        let mut clustering = Clustering::default();
-        // Three points that four core points make noise.
-        clustering.run(&candidates(&[(100.0, 0.0), (100.0, 0.22), (100.0, 0.44)]));
-        let compared = |core_points| clustering.compare(ClusteringCheck { core_points }, Time::ZERO);
-        assert_eq!(compared(None), Ok(()));
-        assert_eq!(compared(Some(4)), Err(SensorError::Clusterings { different: 3, points: 3, time: Time::ZERO }));
+        for method in [ClusteringMethod::Linfa, ClusteringMethod::Grid] {
+            let model = ClusteringModel { method, ..ClusteringModel::default() };
+            let mut clustering = Clustering { model, ..Clustering::default() };
+            // Three points that four core points make noise.
+            clustering.run(&candidates(&[(100.0, 0.0), (100.0, 0.22), (100.0, 0.44)]));
+            let compared = |core_points| clustering.compare(ClusteringCheck { core_points }, Time::ZERO);
+            assert_eq!(compared(None), Ok(()));
+            assert_eq!(compared(Some(4)), Err(SensorError::Clusterings { different: 3, points: 3, time: Time::ZERO }));
+        }
     }
 
     #[test]
@@ -431,7 +436,8 @@ mod tests {
             let mut grid = GridDbscan::default();
             grid.run(&earlier, radius, core_points);
             let count = grid.run(&points, radius, core_points);
-            prop_assert_eq!(indices(&grid), expected.clone());
+            let labels: Vec<_> = grid.labels.iter().map(|label| label.map(|label| label as usize)).collect();
+            prop_assert_eq!(&labels, &expected);
             prop_assert_eq!(count as usize, expected.iter().flatten().max().map_or(0, |last| last + 1));
         }
     }

@@ -1,10 +1,11 @@
 //! DBSCAN (Ester et al. 1996) with an exact search for neighbours on a grid, in memory that is
 //! reused from scan to scan.
 //!
-//! This implementation stays beside `linfa-clustering` for its speed: a point that has joined a
-//! cluster takes no part in later searches, while `linfa-clustering` asks for all neighbours of
-//! each point, as a new list. `docs/explanation/performance.md` has the figures. Both give the same
-//! labels with the same numbers, and so does scikit-learn: a neighbour is at most the radius away.
+//! This implementation stays beside `linfa-clustering`, as a check of each other in the validity
+//! checks, and for its speed: a point that has joined a cluster takes no part in later searches,
+//! while `linfa-clustering` asks for all neighbours of each point, as a new list.
+//! `docs/evidence/performance.md` has the figures. Both give the same labels with the same numbers,
+//! and so does scikit-learn: a neighbour is at most the radius away.
 
 use std::ops::RangeInclusive;
 

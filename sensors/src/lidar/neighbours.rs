@@ -27,6 +27,8 @@ use ndarray::{ArrayBase, ArrayView1, ArrayView2, Axis, Data, Ix2, aview1};
 
 /// Maximum number of cells along each axis. Points that are spread wider get larger cells.
 const MAX_CELLS: f64 = 256.0;
+/// Number of points that a query tests together.
+const BLOCK: usize = 32;
 /// Share by which the cells of a query reach beyond its radius, so that rounding hides no point.
 const ROUNDING: f64 = 1e-5;
 
@@ -183,10 +185,14 @@ impl<F: Float> NearestNeighbourIndex<F> for Grid<'_, F> {
         let runs = self.runs(at, range);
         let mut within = Vec::with_capacity(runs.clone().map(|run| run.len()).sum());
         for run in runs {
-            for (&other, &(view, row)) in self.places[run.clone()].iter().zip(&self.sorted[run]) {
-                if square(at, other) <= limit {
-                    within.push((view.reborrow(), row));
+            for (places, points) in self.places[run.clone()].chunks(BLOCK).zip(self.sorted[run].chunks(BLOCK)) {
+                // A third of the points are within the range: a branch would be taken at random.
+                let (mut near, mut count) = ([0_usize; BLOCK], 0);
+                for (index, &other) in places.iter().enumerate() {
+                    near[count % BLOCK] = index;
+                    count += usize::from(square(at, other) <= limit);
                 }
+                within.extend(near[..count].iter().map(|&index| (points[index].0.reborrow(), points[index].1)));
             }
         }
         Ok(within)
