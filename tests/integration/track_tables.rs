@@ -1,5 +1,6 @@
 //! The tables of tracks and clusters give the figures of the tracker's own tests.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
@@ -11,7 +12,7 @@ use closecall_sensors::{BoxRole, Innovation, SensorMode};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, TrackAuditor, simulate};
 use closecall_testing::python_with;
-use closecall_traffic::Time;
+use closecall_traffic::{Source, Time, TrackId, TrackStatus};
 
 use crate::support::{ROOT, folder, library};
 
@@ -80,5 +81,61 @@ fn the_documented_query_gives_the_consistency_that_the_tracker_s_own_tests_compu
     assert_eq!(computed.len(), expected.len(), "{printed}");
     for (computed, expected) in computed.iter().zip(expected) {
         assert!((computed / expected - 1.0).abs() < 1e-6, "{printed}: {expected}");
+    }
+}
+
+/// A truck as long as the European modular system allows, which passes the ego slowly in the right lane.
+const LONGEST_TRUCK: &str = r#"
+schema-version = 1
+name = "longest-truck-passes"
+description = "A truck of 25 m passes the ego slowly in the right lane."
+duration-s = 60
+road = { lanes = 3, lane-width-m = 3.75 }
+
+[[actor]]
+id = "ego"
+vehicle = { class = "car" }
+start = { absolute = { lane = 2, s-m = 500.0, speed-mps = 30.0 } }
+driver = { ego-stack = { acc = { time-gap-s = 1.0, set-speed-mps = 30.0 }, mis = { max-deceleration-mps2 = 1.0, critical-gap-m = 5.0 } } }
+
+[[actor]]
+id = "truck"
+vehicle = { class = "truck", length-m = 25.0 }
+start = { absolute = { lane = 3, s-m = 455.2, speed-mps = 31.0 } }
+driver = { prescribed = { profile = [[0.0, 31.0]] } }
+"#;
+
+/// The confirmed rear tracks of a run.
+#[derive(Default)]
+struct Followed {
+    ids: BTreeSet<TrackId>,
+    /// Number of steps with several confirmed tracks.
+    several: usize,
+}
+
+impl Observer for Followed {
+    fn step(&mut self, view: &StepView<'_>) {
+        let is_confirmed =
+            |track: &&closecall_traffic::Track| track.source == Source::Rear && track.status != TrackStatus::Tentative;
+        let confirmed: Vec<TrackId> = view.tracks.iter().filter(is_confirmed).map(|track| track.id).collect();
+        self.several += usize::from(confirmed.len() > 1);
+        self.ids.extend(confirmed);
+    }
+
+    fn event(&mut self, _: Time, _: &RunEvent) {}
+}
+
+#[test]
+fn the_tail_of_the_longest_truck_is_no_vehicle_of_its_own() {
+    let folder = folder();
+    let path = folder.path().join("longest-truck.toml");
+    std::fs::write(&path, LONGEST_TRUCK).unwrap();
+    let file = ScenarioFile::load(&path, &[]).unwrap();
+    let scenario = file.concrete(&file.space().nominal()).unwrap();
+    let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(SensorMode::Full) };
+    for seed in [1, 2] {
+        let mut followed = Followed::default();
+        simulate(&scenario, RunKey { seed, sample: 0 }, &arm, &mut followed).unwrap();
+        assert!(followed.ids.len() == 1 && followed.several == 0, "{seed}: {:?}, {}", followed.ids, followed.several);
     }
 }

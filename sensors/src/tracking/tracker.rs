@@ -41,6 +41,9 @@ const MAX_WIDER_M: f64 = 0.7;
 const FALSE_FRONT_M: f64 = 0.5;
 /// Greatest length of a truck (m): European modular system, Council Directive 96/53/EC.
 const LONGEST_TRUCK_M: f64 = 25.25;
+/// Probability of existence from which on a track behind a truck is another vehicle rather than the
+/// truck's tail (assumption).
+const LEAST_TAIL_EXISTENCE: f64 = 0.5;
 /// Standard deviation of the followed point up to which parts tell the length of a vehicle (m;
 /// assumption).
 const SPAN_SD_M: f64 = 0.5;
@@ -138,7 +141,20 @@ impl TrackState {
     fn has_part(&self, other: &Self) -> bool {
         let ([along, across], [part_along, part_across]) = (self.filter.estimate(), other.filter.estimate());
         let apart_mps = maths::hypot(along.speed_mps - part_along.speed_mps, across.speed_mps - part_across.speed_mps);
-        self.contains(part_along.position_m, part_across.position_m) && apart_mps < MAX_PART_SPEED_MPS
+        let is_in_box = self.contains(part_along.position_m, part_across.position_m);
+        (is_in_box || self.has_tail(other)) && apart_mps < MAX_PART_SPEED_MPS
+    }
+
+    /// Returns whether `other` may be the tail of this truck, behind its assumed rear end: what nothing
+    /// shows to be a vehicle, where the longest truck ends.
+    fn has_tail(&self, other: &Self) -> bool {
+        let ([along, across], [tail_along, tail_across]) = (self.filter.estimate(), other.filter.estimate());
+        let behind_m = along.position_m - tail_along.position_m;
+        self.ends.has_front
+            && self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE
+            && other.lifecycle.existence() < LEAST_TAIL_EXISTENCE
+            && (0.0..=LONGEST_TRUCK_M).contains(&behind_m)
+            && (tail_across.position_m - across.position_m).abs() <= self.half_width_m()
     }
 
     /// Returns whether a face at (`s_m`, `d_m`) lies within this track's box.
