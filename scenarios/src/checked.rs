@@ -6,8 +6,8 @@ use closecall_controllers::{
 };
 use closecall_sensors::Sensors;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Environment, GRAVITY_MPS2, KeyPath, LateralPath, Num, PHYSICS_STEP, Parameters,
-    Problem, Range, Road, Time, Vehicle, VehicleState, is_kebab_name,
+    ActorId, CONTROL_STEP, Check, ConfigError, Environment, GRAVITY_MPS2, KeyPath, LateralPath, Num, PHYSICS_STEP,
+    Parameters, Problem, Range, Road, Time, Vehicle, VehicleState, is_kebab_name,
 };
 
 use crate::coverage::CoveragePlan;
@@ -18,7 +18,7 @@ use crate::outcome::LONGEST_RUN_S;
 use crate::run_key::RunKey;
 
 use super::actor::Actor;
-use super::config::{ActorConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
+use super::config::{ActorConfig, ControllerConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
 use super::events::{self};
 use super::fleet::FleetOf;
 use super::intervention::Interventions;
@@ -54,6 +54,8 @@ pub struct Scenario {
     pub interventions: Interventions,
     /// The names of the variables of an FMU.
     pub variables: VariableTable,
+    /// Time from the input of the ego controller to the effect of its command, if it is stated.
+    pub computing: Option<Time>,
 }
 
 impl Scenario {
@@ -123,7 +125,18 @@ impl Check for ScenarioConfig {
             random_numbers: self.random_numbers,
             interventions,
             variables: self.controller.fmu.clone(),
+            computing: self.controller.check_computing(parameters).map_err(|error| error.within("controller"))?,
         })
+    }
+}
+
+impl ControllerConfig {
+    /// Returns the computing time of the controller, if it is stated: at most the control period, in
+    /// which it answers once.
+    fn check_computing(&self, parameters: &Parameters) -> Result<Option<Time>, ConfigError> {
+        let range = Range::above(0.0, CONTROL_STEP.s());
+        let stated = self.computing_s.as_ref().map(|stated| parameters.number(stated, "computing-s", range));
+        Ok(stated.transpose()?.map(Time::from_s))
     }
 }
 

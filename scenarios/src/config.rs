@@ -145,6 +145,12 @@ pub struct ControllerConfig {
     /// The names of the variables of an FMU, if they differ from the names of the quantities.
     #[serde(default)]
     pub fmu: VariableTable,
+    /// Time for which a controller computes in a control step (s): its command takes effect that
+    /// much later than its input, rounded up to whole steps of 10 ms. One from outside that
+    /// computes for longer is an error. Default: the command takes effect at once, and a controller
+    /// from outside may compute for 0.04 s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub computing_s: Option<Num>,
 }
 
 /// A sample whose random numbers are used.

@@ -22,7 +22,7 @@ pub struct Setting {
 }
 
 /// Tables at the top level that a file may leave out and a setting may create.
-const OPTIONAL_TABLES: [&str; 2] = ["ideal", "fault"];
+const OPTIONAL_TABLES: [&str; 3] = ["ideal", "fault", "controller"];
 
 /// Keys of a parameter that leave its distribution as it is.
 const REMARKS: [&str; 5] = ["fitted", "assumed", "observed", "spearman", "note"];

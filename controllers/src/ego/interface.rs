@@ -179,6 +179,12 @@ pub trait EgoController: Send {
     /// [`ControllerError`] if no command could be computed.
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError>;
 
+    /// Returns the number of the process that computes the commands; `None` if this thread does, or
+    /// if no step was made yet.
+    fn process(&self) -> Option<u32> {
+        None
+    }
+
     /// Ends the run, which has an outcome only if this succeeds. `time` is its end. A controller
     /// that is a process checks here that the process has given no more answers than it was asked
     /// for.

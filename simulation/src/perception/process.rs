@@ -68,13 +68,14 @@ impl ProgramError {
 pub(crate) struct PerceptionProcess {
     program: ProgramSettings,
     started: Option<(Child, Kind)>,
-    computing: ComputingTime,
+    /// The computing time, once the period of the scans is known.
+    computing: Option<ComputingTime>,
 }
 
 impl PerceptionProcess {
     /// Creates the process of a run.
     pub(crate) fn new(program: ProgramSettings) -> Self {
-        Self { program, started: None, computing: ComputingTime::default() }
+        Self { program, started: None, computing: None }
     }
 
     /// Sends a question and returns its answer. Starts the process if there is none yet.
@@ -103,7 +104,10 @@ impl PerceptionProcess {
         let parsed =
             parsed.map_err(ProgramError::from).and_then(|parsed| Ok(parsed?)).inspect_err(|_| child.condemn())?;
         let period_s = question.lidars.iter().map(|lidar| lidar.period_s).fold(f64::INFINITY, f64::min);
-        match self.computing.exceeded(spent, 1e3 * period_s.max(CONTROL_STEP.s())) {
+        // Without a LiDAR there is no period that it must keep.
+        let period = Duration::try_from_secs_f64(period_s).unwrap_or(Duration::MAX);
+        let computing = self.computing.get_or_insert_with(|| ComputingTime::of_perception(period));
+        match computing.exceeded(spent) {
             Some(message) => Err(ProgramError::Slow(message)),
             None => Ok(parsed),
         }

@@ -71,6 +71,9 @@ pub(super) struct Run<'a> {
     mis_settings: MisSettings,
     /// The last command of the ego controller.
     command: Option<EgoCommand>,
+    /// The command that moves the ego, and the next one with the time at which it takes effect.
+    acting: Option<EgoCommand>,
+    pending: Option<(Time, EgoCommand)>,
     /// Time of the first command of emergency braking.
     emergency_braking_at: Option<Time>,
     /// How far the driver of each vehicle looks. The ego perceives with its sensors; its margins
@@ -151,6 +154,8 @@ impl<'a> Run<'a> {
             moments: Moments::default(),
             mis_settings,
             command: None,
+            acting: None,
+            pending: None,
             emergency_braking_at: None,
             neighbours: vec![Neighbours::default(); world.len()],
             // One track of each of the three object-level sensors.
@@ -318,6 +323,8 @@ impl<'a> Run<'a> {
             self.emergency_braking_at.get_or_insert(time);
         }
         self.command = Some(command);
+        self.take_effect();
+        self.pending = Some((time + self.scenario.computing.unwrap_or(Time::ZERO), command));
         let ego = self.scenario.ego;
         let rear = self.observe_rear();
         self.note_moments(rear);
@@ -330,6 +337,14 @@ impl<'a> Run<'a> {
             rear,
             failed,
         });
+    }
+
+    /// Lets a command that waits take effect once its time has come. It waits for a control step at
+    /// most, so that only one waits.
+    fn take_effect(&mut self) {
+        if let Some((_, command)) = self.pending.take_if(|(from, _)| *from <= self.world.time()) {
+            self.acting = Some(command);
+        }
     }
 
     /// Observes where the vehicle behind is.

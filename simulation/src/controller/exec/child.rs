@@ -167,6 +167,11 @@ impl Child {
         Ok(child)
     }
 
+    /// Returns the number of the process.
+    pub fn id(&self) -> u32 {
+        self.process.id()
+    }
+
     /// Tries whether the process can be started. It is killed at once.
     ///
     /// # Errors

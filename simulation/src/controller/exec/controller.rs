@@ -173,6 +173,10 @@ impl EgoController for ExecController {
         })
     }
 
+    fn process(&self) -> Option<u32> {
+        self.child.as_ref().map(Child::id)
+    }
+
     fn finish(&mut self, time: Time) -> Result<(), ControllerError> {
         let Some(child) = &mut self.child else { return Ok(()) };
         // The process of a library or an FMU first frees the controller.

@@ -18,7 +18,8 @@ impl Run<'_> {
             observer.event(time, &RunEvent::EventTriggered { event: event.to_owned() });
         });
         let ego = self.scenario.ego;
-        let commanded_mps2 = self.command.map_or(0.0, |command| command.acceleration_mps2);
+        self.take_effect();
+        let commanded_mps2 = self.acting.map_or(0.0, |command| command.acceleration_mps2);
         self.actions[ego] = Action { acceleration_mps2: commanded_mps2, ..Action::default() };
         for human in &mut self.humans {
             let actor = human.actor;
@@ -49,7 +50,7 @@ impl Run<'_> {
                 observer.event(time, &RunEvent::DriverNote { actor, note });
             }
             if actor == ego {
-                let braking = self.command.filter(|command| command.state == EgoState::EmergencyBraking);
+                let braking = self.acting.filter(|command| command.state == EgoState::EmergencyBraking);
                 let most_mps2 = braking.map_or(f64::INFINITY, |command| command.acceleration_mps2);
                 self.actions[ego].acceleration_mps2 = action.acceleration_mps2.min(most_mps2);
                 continue;
