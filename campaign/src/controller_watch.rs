@@ -104,6 +104,11 @@ impl ControllerWatch {
         }
     }
 
+    /// Adds what else shows that a controller changed, in words.
+    pub fn add(&mut self, changes: Vec<String>) {
+        self.changes.extend(changes);
+    }
+
     fn keep(&self) -> Result<Vec<String>, WriteError> {
         let changes: Vec<String> = self.changes.iter().cloned().collect();
         self.folder.as_ref().map_or(Ok(()), |folder| keep_changes(folder, &changes))?;

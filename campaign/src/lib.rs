@@ -47,6 +47,7 @@ pub mod integrity;
 pub mod interrupt;
 pub mod journal;
 mod journal_plan;
+pub mod late_repetition;
 pub mod ledger;
 pub mod left_out;
 pub mod lock;

@@ -14,6 +14,7 @@ use closecall_campaign::end_rule::{EndMonitor, EndedEarly};
 use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
 use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::{GateSet, Judge};
+use closecall_campaign::late_repetition::LateRepetition;
 use closecall_campaign::left_out::{leave_out, sentences};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::partition::Partition;
@@ -663,6 +664,7 @@ pub(super) fn carry_out(
         scenarios: campaign.works.len(),
     };
     let mut progress = Progress::new(&campaign, gates, StopMonitor::start(stop), EndMonitor::new(planned.end.rule()));
+    let mut repetition = LateRepetition::new(&campaign);
     let locked = results.locked.as_ref();
     let mut ahead = campaign.run_first(locked, &planned.first, |next| {
         watch.look();
@@ -670,6 +672,7 @@ pub(super) fn carry_out(
     })?;
     let resumption = campaign.run_after(locked, &mut ahead, |next| {
         watch.look();
+        repetition.observe(next);
         progress.push(next)
     })?;
     progress.bar.finish_and_clear();
@@ -699,6 +702,7 @@ pub(super) fn carry_out(
             ExitCode::first_of([code, ExitCode::Io])
         }));
     }
+    watch.add(repetition.run(&campaign)?);
     let tally = &progress.tally;
     let mut judged = tally.judgement();
     judged.add_left_out(&manifest.left_out);

@@ -214,7 +214,10 @@ impl Rare<'_> {
                 watch.look();
             };
             match rare.run(work, journal.as_mut(), &stop, &mut on_run) {
-                Ok(report) => reports.push(report),
+                Ok(report) => {
+                    watch.add(report.difference.iter().cloned().collect());
+                    reports.push(report);
+                }
                 Err(RareError::PartEnds { runs }) => runs_of_part.push((work.1.file.config().name.clone(), runs)),
                 Err(RareError::Stopped) => {
                     watch.finish()?;

@@ -71,6 +71,7 @@ impl RarePlan {
             first_error: None,
             relevance: Relevance::of(work),
             nearest: Vec::new(),
+            first: None,
         };
         let mut report = match self.method {
             Method::Importance => {
@@ -89,6 +90,7 @@ impl RarePlan {
         report.scenario.clone_from(&file.config().name);
         report.parameters = file.space().varying().map(|(name, _)| name.to_string()).collect();
         report.not_judged = runs.relevance.not_judged();
+        report.difference = runs.repeat_first()?;
         (report.errors, report.first_error, report.nearest) = (runs.errors, runs.first_error, runs.nearest);
         if report.errors > 0 {
             // A run that failed may have been an event.

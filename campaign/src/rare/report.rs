@@ -90,6 +90,9 @@ pub struct RareReport {
     pub nearest: Vec<Nearest>,
     /// The reasons for which a low probability says nothing about the system under test.
     pub not_judged: Vec<String>,
+    /// What differed when the first run was run again at the end.
+    #[serde(skip)]
+    pub difference: Option<String>,
 }
 
 /// Details of a search for the first case.
@@ -176,6 +179,7 @@ impl RareReport {
             search: None,
             nearest: Vec::new(),
             not_judged: Vec::new(),
+            difference: None,
         }
     }
 

@@ -4,13 +4,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use super::error::RareError;
-use super::journal::{RareJournal, RareRecord};
+use super::journal::{KeptResponse, RareJournal, RareRecord};
 use super::nearness::Nearness;
 use super::points::{PointRunner, point_samples};
 use super::problem::{Point, Response, Simulator};
 use super::relevance::Relevance;
 use super::report::Nearest;
 use crate::campaign_error::CampaignError;
+use crate::late_repetition::{difference, is_foreign};
 use crate::partition::Partition;
 use crate::record::{Record, SampleFailure};
 use crate::runner::Work;
@@ -41,6 +42,8 @@ pub(super) struct Runs<'a> {
     pub(super) relevance: Relevance,
     /// The events that are nearest to the nominal case.
     pub(super) nearest: Vec<Nearest>,
+    /// The first run, with its response.
+    pub(super) first: Option<(Point, Response)>,
 }
 
 /// Number of events that a report shows.
@@ -56,6 +59,9 @@ impl Runs<'_> {
             self.first_error.clone_from(&record.failure);
         }
         let response = Response::from(record.response);
+        if self.first.is_none() && record.failure.is_none() {
+            self.first = Some((point.clone(), response));
+        }
         if response.is_event() {
             let distance_sd = point.distance_sd();
             let rank = self.nearest.partition_point(|other| other.distance_sd <= distance_sd);
@@ -100,6 +106,32 @@ impl Runs<'_> {
         }
         self.count(point, &kept);
         Ok(response)
+    }
+
+    /// Runs the first run again, after the last one, if its controllers or its perception may change
+    /// with the time. Returns what differs, in words. The journal does not get it.
+    pub(super) fn repeat_first(&mut self) -> Result<Option<String>, RareError> {
+        let is_closed = self.journal.as_ref().is_some_and(|journal| journal.is_closed());
+        let Some((point, response)) = self.first.take().filter(|_| is_foreign(self.work) && !is_closed) else {
+            return Ok(None);
+        };
+        let (work, nearness, mut again) = (self.work, self.nearness, None);
+        let mut on_finished = |finished: Finished| {
+            let has_outcome = finished.record.arms.iter().all(|arm| arm.result.is_ok());
+            again = has_outcome.then(|| nearness.response(&finished.record));
+            Ok::<_, CampaignError>(ControlFlow::Continue(()))
+        };
+        let points = std::slice::from_ref(&point);
+        match self.remote {
+            Some(remote) => remote.run_points((self.index, work), points, self.stop, &mut on_finished)?,
+            None => {
+                let samples = Arc::new(point_samples(work, points));
+                self.workers.run_samples(&samples, 0..1, self.stop, on_finished)?;
+            }
+        }
+        // A score that is not finite has no place in the journal.
+        let differs = again.is_some_and(|again| KeptResponse::from(again) != KeptResponse::from(response));
+        Ok(differs.then(|| difference("the first run", &work.file.config().name, None)))
     }
 
     /// Returns the responses of points, which have these numbers.
