@@ -196,6 +196,13 @@ impl Record {
         self.arms.iter_mut().zip(&earlier.arms).for_each(|(arm, earlier)| arm.follow(earlier));
     }
 
+    /// Returns the sample with the baseline in place of the arm under test; `None` without a
+    /// baseline.
+    pub(crate) fn of_baseline(&self) -> Option<Self> {
+        let baseline = self.arms.first().filter(|_| self.arms.len() > 1)?;
+        Some(Self { arms: vec![baseline.clone(), baseline.clone()], ..self.clone() })
+    }
+
     /// Returns how the result of this sample compares with an outcome, to the last bit. An outcome of
     /// another sample is not compared.
     pub fn agreement(&self, outcome: &Outcome) -> Agreement {

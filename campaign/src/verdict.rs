@@ -156,6 +156,8 @@ pub struct Judgement {
     pub coverage: Vec<(String, Vec<CoverageResult>)>,
     /// The gate on the number of flaky samples, if there is one that can be missed.
     pub flaky: Option<FlakyGate>,
+    /// Whether a system that does nothing passes as well.
+    pub shows_no_benefit: bool,
 }
 
 impl Judgement {
@@ -323,7 +325,18 @@ pub fn judge(summary: &Summary, judge: &Judge, allowed: Allowed) -> Judgement {
     let coverage = judge.coverage().map(|(name, results)| (name.to_owned(), results)).collect();
     let background = findings.background.clone();
     let reasons = findings.into_reasons(decision);
-    Judgement { decision, reasons, background, gates, requirements, expectations, probabilities, coverage, flaky }
+    Judgement {
+        decision,
+        reasons,
+        background,
+        gates,
+        requirements,
+        expectations,
+        probabilities,
+        coverage,
+        flaky,
+        shows_no_benefit: judge.shows_no_benefit(),
+    }
 }
 
 /// Returns the subjects of the gates that somebody set and that no scenario decides: there is no
@@ -542,13 +555,10 @@ fn judge_availability(summary: &Summary, findings: &mut Findings) {
 /// The remark on a system whose sensors had failed.
 const NOT_AVAILABLE: &str = "the system under test was not available, because sensors had failed,";
 
-/// A system that never acted was not tested by a scenario that asks for prevented collisions.
+/// A system that never acted was not tested by a scenario that asks for action.
 fn judge_action(judge: &Judge, findings: &mut Findings) {
-    for (name, missing, count) in judge.without_action() {
-        let reason = format!(
-            "{name}: the system under test never {missing} in {}, and they do not decide what it does",
-            samples(count)
-        );
+    for (name, missing) in judge.without_action() {
+        let reason = format!("{name}: the system under test {missing}, and they do not decide what it does");
         findings.add(Decision::NotJudged, reason);
     }
 }

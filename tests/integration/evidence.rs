@@ -362,6 +362,101 @@ fn a_controller_that_computes_for_longer_than_its_period_ends_its_sample_as_an_e
 }
 
 #[test]
+fn sixty_milliseconds_in_every_fiftieth_step_are_an_error() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let run = |step: &str, settings: &[&str], expected| {
+        let controller = python_controller(folder.path(), step);
+        let fixed =
+            ["-n", "1", "--sensors", "ground-truth", "--set", "duration-s=20", "--set", "expects=[]", "--no-gate"];
+        let args = [&fixed[..], &["--controller", &controller], settings].concat();
+        stdout(&campaign(&library("overtake-without-brake"), &args), expected)
+    };
+    let in_every_fiftieth = "message['time_ns'] // 40_000_000 % 50 == 7";
+    // Its own processor time, and a wait for something else.
+    let computes = format!(
+        "start = time.process_time()\n        while {in_every_fiftieth} and time.process_time() < start + 0.06: pass"
+    );
+    assert!(run(&computes, &[], 5).contains("computes for more than its 40 ms in"));
+    let sleeps = format!("time.sleep(0.06 if {in_every_fiftieth} else 0)");
+    assert!(run(&sleeps, &[], 5).contains("computes for more than its 40 ms in 5 of"));
+    // A stated computing time is the budget, and the command comes that much later.
+    assert!(run("time.sleep(0.03)", &["--set", "controller.computing-s=0.02"], 5).contains("and has 20 ms"));
+}
+
+#[test]
+fn a_controller_that_changes_after_the_first_checks_makes_a_small_campaign_invalid() {
+    if !has_python() {
+        return;
+    }
+    let folder = folder();
+    let (script, starts) = (folder.path().join("changing.py"), folder.path().join("starts"));
+    // Each process has a number. From one number on, the ego brakes.
+    let run = |from: usize| {
+        let _ = std::fs::remove_file(&starts);
+        let text = format!(
+            "import json, sys\nwith open({starts:?}, 'a+') as file:\n    file.write('x')\n    file.seek(0)\n    number = len(file.read())\n\
+             for line in sys.stdin:\n    message = json.loads(line)\n    hello = {{'type': 'hello', 'protocol': 1}}\n    \
+             answer = {{'acceleration_mps2': -1.0 if number > {from} else 0.0, 'state': 'following'}}\n    \
+             print(json.dumps(hello if message['type'] == 'hello' else answer), flush=True)\n"
+        );
+        std::fs::write(&script, text).unwrap();
+        let controller = format!("exec:python3 {}", script.display());
+        let out = folder.path().join("out");
+        let _ = std::fs::remove_dir_all(&out);
+        let args = [
+            "-n",
+            "6",
+            "--jobs",
+            "1",
+            "--sensors",
+            "ground-truth",
+            "--set",
+            "duration-s=4",
+            "--set",
+            "expects=[]",
+            "--no-gate",
+            "--out",
+            out.to_str().unwrap(),
+            "--controller",
+            &controller,
+        ];
+        (campaign(&library("slow-approach"), &args), std::fs::read_to_string(&starts).unwrap().len())
+    };
+    let (unchanged, processes) = run(usize::MAX);
+    stdout(&unchanged, 0);
+    // Two samples run again at the end.
+    let (changed, _) = run(processes - 2);
+    let text = stdout(&changed, 7);
+    assert!(text.contains("sample 0 of slow-approach with exec ran again after the last one"), "{text}");
+}
+
+#[test]
+fn a_system_that_never_acts_where_a_vehicle_comes_near_is_not_judged() {
+    let run = |name: &str, controller: &str, expected| {
+        let args = ["-n", "60", "--seed", "31", "--sensors", "object", "--arms", controller];
+        stdout(&campaign(&library(name), &args), expected)
+    };
+    const HARMLESS: &str =
+        "a system that does nothing passes as well, so that this shows only that the system does no harm";
+    // Cruise control has no sensors that look back.
+    for name in ["overtake-without-brake", "rear-follower-stays"] {
+        let text = run(name, "acc,gap-1.2", 4);
+        assert!(
+            text.contains("NOT JUDGED") && text.contains("never slowed the ego for a vehicle behind in 60 samples"),
+            "{text}"
+        );
+        let text = run(name, "acc,mis", 0);
+        assert!(text.contains("PASS: ") && text.contains(HARMLESS), "{text}");
+    }
+    // It is to stay off there.
+    assert!(run("left-lane-blocked", "acc,gap-1.2", 0).contains(HARMLESS));
+    assert!(!run("low-thw-overtake-at-cut-out", "acc,mis", 4).contains(HARMLESS));
+}
+
+#[test]
 fn a_secret_seed_is_drawn_stated_and_resumed() {
     let folder = folder();
     let out = folder.path().join("out");

@@ -305,6 +305,20 @@ fn an_event_that_cannot_happen_is_not_judged() {
 }
 
 #[test]
+fn a_bound_on_slowing_that_compares_with_a_baseline_is_not_judged_without_one() {
+    let run = |words: &str| {
+        let fixed = "campaign anchor-lead-brakes --design subset --event collision --max-probability 0.9 -n 40 --sensors ground-truth";
+        let output = closecall(fixed.split_whitespace().chain(words.split_whitespace()));
+        (code(&output), String::from_utf8(output.stdout).unwrap())
+    };
+    let unknown = "whether the system under test slows the ego before a vehicle behind is near is not known";
+    let (code, text) = run("");
+    assert!(code == 4 && text.contains(unknown) && text.contains("--paired"), "{text}");
+    let (_, text) = run("--paired");
+    assert!(!text.contains(unknown), "{text}");
+}
+
+#[test]
 fn a_gate_that_can_only_fail_ends_a_campaign_that_fails_fast() {
     // The ego collides in neither arm; its smallest gap falls below 30 m in most samples.
     let path = fixture();

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use closecall_scenarios::criteria::{Aggregate, Expression, FlagName, Quantity};
+use closecall_scenarios::criteria::{Aggregate, Expression, FlagName, LEAD_BRAKED, Quantity};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::{Function, WEAKENED_COVERAGE, library};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 
-use super::course::{Course, asks_for_action, missing_action};
-use super::evaluate::{Accumulator, Evaluation, Evidence};
+use super::course::{Course, is_idle, least_action, missing_action};
+use super::evaluate::{Accumulator, Answer, Evaluation, Evidence};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
-use super::set::{GateSet, GateSpec, ProbabilitySpec};
+use super::set::{GateSet, GateSource, GateSpec, ProbabilitySpec};
 use crate::attribution;
 use crate::coverage::{CoverageCounter, CoverageResult};
 use crate::ledger::Inference;
@@ -19,6 +19,7 @@ use crate::record::Record;
 use closecall_scenarios::parameters::SpaceEntry;
 use closecall_traffic::ParameterName;
 use closecall_traffic::statistics::format::percent;
+use closecall_traffic::words::counted;
 
 use crate::repeats::{Repeats, is_varied};
 use crate::runner::Work;
@@ -28,11 +29,14 @@ use crate::runner::Work;
 struct Gate {
     spec: GateSpec,
     accumulator: Accumulator,
+    /// The evidence with the baseline in place of the arm under test.
+    of_baseline: Accumulator,
 }
 
 impl Gate {
     fn new(spec: &GateSpec) -> Self {
-        Self { accumulator: Accumulator::new(spec.expression), spec: spec.clone() }
+        let accumulator = Accumulator::new(spec.expression);
+        Self { of_baseline: accumulator.clone(), accumulator, spec: spec.clone() }
     }
 }
 
@@ -53,8 +57,9 @@ struct Judged {
     overridden: Vec<String>,
     /// What sets the scenario apart from the library's scenario of the same name.
     unlike_library: Vec<String>,
-    /// Whether the scenario asks for collisions that the system under test prevents.
-    asks_for_action: bool,
+    /// The share of the samples in which the system under test acts, which it must exceed to be
+    /// tested; `None` if the scenario asks for no action.
+    least_action: Option<f64>,
     /// The function that the scenario judges.
     function: Function,
     /// The parameters that are sampled beyond what trajectory data show, in words.
@@ -120,7 +125,7 @@ impl Judge {
                 samples: 0,
                 overridden: overridden(work, set),
                 unlike_library: library::differences(&work.file),
-                asks_for_action: asks_for_action(config),
+                least_action: least_action(config),
                 function: config.function,
                 extrapolations: work.file.space().iter().filter_map(extrapolation).collect(),
                 coverage: CoverageCounter::new(work),
@@ -148,8 +153,10 @@ impl Judge {
         }
         judged.observe_expectations(record);
         judged.coverage.push(record);
+        let of_baseline = record.of_baseline();
         for gate in &mut judged.gates {
             gate.accumulator.push(record);
+            of_baseline.iter().for_each(|record| gate.of_baseline.push(record));
         }
     }
 
@@ -182,15 +189,40 @@ impl Judge {
         self.scenarios.iter().map(|judged| judged.scenario.as_str())
     }
 
-    /// Returns the scenarios that ask what the system under test prevents, and in which it never
-    /// acted, with the action that is missing and their numbers of samples.
-    pub fn without_action(&self) -> impl Iterator<Item = (&str, &'static str, u64)> {
+    /// Returns the scenarios that ask for action of the system under test, and in which it never or
+    /// hardly ever acted, with what it did not do in words.
+    pub fn without_action(&self) -> impl Iterator<Item = (&str, String)> {
         let is_told = |judged: &Judged| self.is_paired || judged.function == Function::Mis;
-        let idle = move |judged: &&Judged| {
-            judged.asks_for_action && judged.samples > 0 && judged.acted == 0 && is_told(judged)
-        };
-        let idle = self.scenarios.iter().filter(idle);
-        idle.map(|judged| (judged.scenario.as_str(), missing_action(judged.function), judged.samples))
+        let idle = self
+            .scenarios
+            .iter()
+            .filter(move |judged| is_told(judged) && is_idle(judged.least_action, (judged.acted, judged.samples)));
+        idle.map(|judged| {
+            let runs = counted(judged.samples, "sample");
+            (judged.scenario.as_str(), missing_action(judged.function, judged.acted, &runs))
+        })
+    }
+
+    /// Returns true if a system that does nothing passes as well: in a paired campaign the baseline
+    /// meets every gate in place of the system under test, and in another one nothing happens in any
+    /// scenario, and its file alone judges. Passing then shows only that the system does no harm.
+    pub fn shows_no_benefit(&self) -> bool {
+        self.scenarios.iter().all(|judged| {
+            let evidence = self.evidence(judged.is_varied);
+            let is_met_by_baseline = |gate: &Gate| match gate.spec.expression.quantity {
+                Quantity::Covered(_) => true,
+                _ => gate.of_baseline.evaluate(&evidence).answer == Answer::Met,
+            };
+            let is_of_file = |gate: &Gate| matches!(gate.spec.source, GateSource::Requirement(_));
+            let is_quiet = judged.function == Function::Mis
+                && judged.least_action.is_none()
+                && judged.expects.iter().all(|flag| flag.measure().name != LEAD_BRAKED);
+            let does_no_more = match self.is_paired {
+                true => judged.gates.iter().all(is_met_by_baseline),
+                false => is_quiet && judged.gates.iter().all(is_of_file),
+            };
+            does_no_more && judged.probability.is_none()
+        })
     }
 
     /// Returns the values that each scenario samples beyond trajectory data, in words.
@@ -294,7 +326,9 @@ fn extrapolation((name, entry): (&ParameterName, &SpaceEntry)) -> Option<String>
 
 impl Judged {
     fn observe_expectations(&mut self, record: &Record) {
-        let Some(Course { happened, acted, .. }) = Course::of(record, &self.expects, self.function) else { return };
+        let Some(Course { happened, acted, .. }) = Course::of(record, &self.expects, self.function, &[]) else {
+            return;
+        };
         self.samples += 1;
         self.happened += u64::from(happened);
         self.acted += u64::from(acted);

@@ -14,7 +14,7 @@ mod result;
 mod set;
 
 pub use assemble::{AssemblyError, PresetGates};
-pub(crate) use course::{Course, asks_for_action, forbids_unprompted_slowing, missing_action};
+pub(crate) use course::{Course, checks_of_slowing, is_idle, least_action, missing_action};
 pub(crate) use evaluate::value;
 pub use evaluate::{Accumulator, Answer, Certainty, Evaluation, LEAST_SAMPLES, OpenReason};
 pub use judge::Judge;

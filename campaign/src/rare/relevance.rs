@@ -9,12 +9,12 @@
 //! of the scenario: only they count for the share in which something happens.
 
 use closecall_scenarios::Function;
-use closecall_scenarios::criteria::FlagName;
+use closecall_scenarios::criteria::{Expression, FlagName};
 use closecall_traffic::statistics::interval::lower_bound;
 use closecall_traffic::words::counted;
 
 use crate::attribution::{CONFIDENCE, MOST};
-use crate::gate::{Course, ExpectationResult, asks_for_action, forbids_unprompted_slowing, missing_action};
+use crate::gate::{Course, ExpectationResult, checks_of_slowing, is_idle, least_action, missing_action};
 use crate::record::Record;
 use crate::runner::Work;
 
@@ -25,16 +25,19 @@ pub(super) struct Relevance {
     expects: Vec<FlagName>,
     least_share: f64,
     function: Function,
-    /// Whether a system that never acts was not tested.
-    needs_action: bool,
-    /// Whether the scenario bounds how often the ego is slowed before a vehicle behind is near.
-    forbids_slowing: bool,
+    /// The share of the runs in which the system acts, which it must exceed to be tested.
+    least_action: Option<f64>,
+    /// The checks that bound how often the ego is slowed before a vehicle behind is near.
+    of_slowing: Vec<Expression>,
+    /// Whether every sample has a baseline.
+    is_paired: bool,
     /// Number of the first runs; `None` before them.
     first: Option<u64>,
-    /// First runs with an outcome, those in which everything happened, and those in which the ego
-    /// was slowed before a vehicle behind was near.
+    /// First runs with an outcome, and those in which everything happened.
     samples: u64,
     happened: u64,
+    /// First runs that a check of slowing counts, and those in which the ego was slowed.
+    counted: u64,
     slowed: u64,
     /// All runs with an outcome, and those in which the system acted.
     runs: u64,
@@ -50,11 +53,13 @@ impl Relevance {
             expects: config.expects.clone(),
             least_share: config.expects_share,
             function: config.function,
-            needs_action: asks_for_action(config) && is_told,
-            forbids_slowing: forbids_unprompted_slowing(config),
+            least_action: least_action(config).filter(|_| is_told),
+            of_slowing: checks_of_slowing(config),
+            is_paired: work.arms.len() > 1,
             first: None,
             samples: 0,
             happened: 0,
+            counted: 0,
             slowed: 0,
             runs: 0,
             acted: 0,
@@ -63,8 +68,8 @@ impl Relevance {
 
     /// Returns what a run shows; `None` if it has no outcome, or the scenario asks for nothing.
     pub(super) fn course(&self, record: &Record) -> Option<Course> {
-        let asks = !self.expects.is_empty() || self.needs_action || self.forbids_slowing;
-        asks.then(|| Course::of(record, &self.expects, self.function)).flatten()
+        let asks = !self.expects.is_empty() || self.least_action.is_some() || !self.of_slowing.is_empty();
+        asks.then(|| Course::of(record, &self.expects, self.function, &self.of_slowing)).flatten()
     }
 
     /// Says that so many runs follow. The first ones are samples of the scenario.
@@ -80,7 +85,8 @@ impl Relevance {
         if self.first.is_some_and(|first| run < first) {
             self.samples += 1;
             self.happened += u64::from(happened);
-            self.slowed += u64::from(slowed_unprompted);
+            self.counted += u64::from(slowed_unprompted.is_some());
+            self.slowed += u64::from(slowed_unprompted == Some(true));
         }
     }
 
@@ -95,20 +101,33 @@ impl Relevance {
         };
         let is_missed = !self.expects.is_empty() && self.samples > 0 && !expectation.is_met();
         let missed = is_missed.then(|| format!("what the scenario is about did not happen: {expectation}"));
-        let is_idle = self.needs_action && self.runs > 0 && self.acted == 0;
-        let idle = is_idle.then(|| {
-            let (missing, runs) = (missing_action(self.function), counted(self.runs, "run"));
-            format!("the system under test never {missing} in {runs}, and they do not decide what it does")
+        let idle = is_idle(self.least_action, (self.acted, self.runs)).then(|| {
+            let missing = missing_action(self.function, self.acted, &counted(self.runs, "run"));
+            format!("the system under test {missing}, and they do not decide what it does")
         });
-        let is_slower = self.forbids_slowing && lower_bound(self.slowed, self.samples, CONFIDENCE) > MOST;
+        let is_slower = lower_bound(self.slowed, self.counted, CONFIDENCE) > MOST;
         let slower = is_slower.then(|| {
             format!(
                 "the system under test slowed the ego before a vehicle behind was near in {} of {}, and a slower ego needs no system",
                 self.slowed,
-                counted(self.samples, "sample")
+                counted(self.counted, "sample")
             )
         });
-        missed.into_iter().chain(idle).chain(slower).collect()
+        let open = self.unknown_slowing().map(|reason| {
+            format!(
+                "whether the system under test slows the ego before a vehicle behind is near is not known: {reason}"
+            )
+        });
+        [missed, idle, slower, open].into_iter().flatten().collect()
+    }
+
+    /// Returns why the checks of slowing have no answer, if they have none.
+    fn unknown_slowing(&self) -> Option<String> {
+        if let Some(check) = self.of_slowing.iter().find(|check| check.needs_pairs() && !self.is_paired) {
+            return Some(format!("`{check}` compares with a baseline, which --paired adds"));
+        }
+        let check = self.of_slowing.first().filter(|_| self.samples > 0 && self.counted == 0)?;
+        Some(format!("no sample meets the condition of `{check}`"))
     }
 }
 
@@ -118,7 +137,7 @@ mod tests {
 
     use super::*;
 
-    const ACTED: Course = Course { happened: true, acted: true, slowed_unprompted: false };
+    const ACTED: Course = Course { happened: true, acted: true, slowed_unprompted: Some(false) };
 
     fn relevance() -> Relevance {
         Relevance {
@@ -126,11 +145,13 @@ mod tests {
             expects: vec![EGO_COLLIDED.parse().unwrap()],
             least_share: 0.5,
             function: Function::Mis,
-            needs_action: true,
-            forbids_slowing: true,
+            least_action: Some(0.0),
+            of_slowing: vec!["upper(slowed_unprompted) <= 0.05".parse().unwrap()],
+            is_paired: false,
             first: None,
             samples: 0,
             happened: 0,
+            counted: 0,
             slowed: 0,
             runs: 0,
             acted: 0,
@@ -166,20 +187,32 @@ mod tests {
 
     #[test]
     fn an_ego_that_is_slower_where_the_scenario_forbids_it_is_not_judged() {
-        let reasons = |slowed: u64, forbids_slowing: bool| {
-            let mut relevance = Relevance { forbids_slowing, ..relevance() };
+        let reasons = |slowed: u64, of_check: u64| {
+            let mut relevance = relevance();
             relevance.begin(100);
             for run in 0..200 {
                 // The runs that were moved towards the event say nothing about it.
-                let slowed_unprompted = run < slowed || run >= 100;
+                let slowed_unprompted = (run < of_check || run >= 100).then_some(run < slowed || run >= 100);
                 relevance.count(run, Some(Course { slowed_unprompted, ..ACTED }));
             }
             relevance.not_judged()
         };
         let expected = "the system under test slowed the ego before a vehicle behind was near in 12 of 100 samples";
-        assert!(reasons(12, true)[0].starts_with(expected), "{:?}", reasons(12, true));
-        assert_eq!(reasons(4, true), Vec::<String>::new());
-        assert_eq!(reasons(12, false), Vec::<String>::new());
+        assert!(reasons(12, 100)[0].starts_with(expected), "{:?}", reasons(12, 100));
+        assert_eq!(reasons(4, 100), Vec::<String>::new());
+        assert!(reasons(4, 20)[0].contains("in 4 of 20 samples"), "{:?}", reasons(4, 20));
+        assert!(reasons(0, 0)[0].contains("no sample meets the condition"), "{:?}", reasons(0, 0));
+    }
+
+    #[test]
+    fn a_bound_that_compares_with_a_baseline_is_not_judged_without_one() {
+        let check = "upper(unprompted_deficit_mps > 0.5 | baseline.unprompted_deficit_mps < 0.5) <= 0.05";
+        let of_slowing = vec![check.parse().unwrap()];
+        let paired = Relevance { of_slowing, is_paired: true, ..relevance() };
+        assert_eq!(paired.not_judged(), Vec::<String>::new());
+        let alone = Relevance { is_paired: false, ..paired };
+        let reasons = alone.not_judged();
+        assert!(reasons.len() == 1 && reasons[0].contains(check) && reasons[0].contains("--paired"), "{reasons:?}");
     }
 
     #[test]

@@ -294,6 +294,7 @@ mod tests {
             probabilities: Vec::new(),
             coverage: Vec::new(),
             flaky: None,
+            shows_no_benefit: false,
         };
         let text = VerdictText { judged: &judged, scenarios: 104 }.to_string();
         let lines: Vec<&str> = text.lines().collect();

@@ -23,6 +23,10 @@ use crate::units::unit_of;
 /// Largest number of scenarios that a sentence names.
 const NAMED: usize = 4;
 
+/// What a sentence adds to a verdict that a system that does nothing gets as well.
+const NO_BENEFIT: &str =
+    "a system that does nothing passes as well, so that this shows only that the system does no harm";
+
 /// Returns the verdict in one sentence. `scenarios` is the number of scenarios of the campaign.
 pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
     let word = judged.word();
@@ -68,10 +72,11 @@ pub(crate) fn sentence(judged: &Judgement, scenarios: usize) -> String {
                     .then(|| format!("{} without criteria", counted(without_criteria, "requirement"))),
             ];
             let rest: Vec<String> = rest.into_iter().flatten().collect();
-            Some(match rest.is_empty() {
+            let met = match rest.is_empty() {
                 true => format!("{word}: {all} what is required, {met} of {} gates", standings.len()),
                 false => format!("{word}: {met} of {} gates are met, {}", standings.len(), rest.join(", ")),
-            })
+            };
+            Some(if judged.shows_no_benefit { format!("{met}; {NO_BENEFIT}") } else { met })
         }
         Decision::NotJudged | Decision::Overridden | Decision::SampleError | Decision::Invalid => first_reason(),
         Decision::Measured => None,
@@ -388,6 +393,7 @@ mod tests {
             probabilities: Vec::new(),
             coverage: Vec::new(),
             flaky: None,
+            shows_no_benefit: false,
         }
     }
 
@@ -551,5 +557,11 @@ mod tests {
         );
         let met = judged(Decision::Pass, vec![gate("a", "count(ego_collided) <= 0", None, 0.0, Answer::Met)]);
         assert_eq!(sentence(&met, 1), "PASS: the scenario meets what is required, 1 of 1 gates");
+        let harmless = Judgement { shows_no_benefit: true, ..met };
+        assert_eq!(
+            sentence(&harmless, 1),
+            "PASS: the scenario meets what is required, 1 of 1 gates; a system that does nothing passes as well, so that this shows only \
+             that the system does no harm"
+        );
     }
 }

@@ -60,7 +60,7 @@ impl Measure {
     /// decides.
     pub(super) fn exceeds(&self) -> Option<(&'static str, f64)> {
         match self.name {
-            SLOWED_UNPROMPTED => Some(("unprompted_deficit_mps", SLOWED_MPS)),
+            SLOWED_UNPROMPTED => Some((UNPROMPTED_DEFICIT, SLOWED_MPS)),
             "braked_at_crossing" => Some(("crossing_braking_mps2", HARD_BRAKING_MPS2)),
             _ => None,
         }
@@ -189,8 +189,17 @@ fn thw_gain_s(outcome: &Outcome) -> Option<f64> {
 /// The measure of a system that acts for a vehicle behind, whatever it reports.
 pub const SLOWED_FOR_REAR: &str = "slowed_for_rear";
 
+/// The flag that the lead vehicle brakes.
+pub const LEAD_BRAKED: &str = "lead_braked";
+
+/// The flag that a vehicle behind meets the conditions for engaging.
+pub const REAR_NEAR: &str = "rear_near";
+
 /// The flag that the ego was slowed before a vehicle behind was near.
 pub const SLOWED_UNPROMPTED: &str = "slowed_unprompted";
+
+/// The number that decides that flag.
+pub const UNPROMPTED_DEFICIT: &str = "unprompted_deficit_mps";
 
 /// The measure that gates judge after the validity checks.
 pub const EGO_COLLIDED: &str = "ego_collided";
@@ -255,7 +264,7 @@ pub const MEASURES: &[Measure] = &[
     flag("ended_in_standstill", "the ego and the vehicles near it come to a stop", |outcome| {
         is(outcome.end == EndReason::Standstill)
     }),
-    flag("rear_near", "the rear vehicle comes near: within 100 m, at 10 km/h or more", |outcome| {
+    flag(REAR_NEAR, "the rear vehicle comes near: within 100 m, at 10 km/h or more", |outcome| {
         reached(outcome, Moment::RearNear)
     }),
     flag("rear_cut_out", "the rear vehicle starts to change lanes in order to overtake", |outcome| {
@@ -271,7 +280,7 @@ pub const MEASURES: &[Measure] = &[
         reached(outcome, Moment::CriticalDistance)
     }),
     flag("rear_passed", "the rear vehicle passes the ego", |outcome| reached(outcome, Moment::Concluded)),
-    flag("lead_braked", "the lead vehicle brakes", |outcome| reached(outcome, Moment::FrontBrakes)),
+    flag(LEAD_BRAKED, "the lead vehicle brakes", |outcome| reached(outcome, Moment::FrontBrakes)),
     number("min_thw_front_s", NOT_NEGATIVE, "smallest time headway to the lead vehicle", |outcome| {
         margin(outcome, |margins| margins.min_thw_front_s)
     }),
@@ -309,7 +318,7 @@ pub const MEASURES: &[Measure] = &[
         |outcome| Some(outcome.margins.max_speed_deficit_mps),
     ),
     number(
-        "unprompted_deficit_mps",
+        UNPROMPTED_DEFICIT,
         SPEED,
         "largest speed by which the ego is slower than the lead vehicle before a vehicle behind gives a reason, and before the lead vehicle brakes",
         |outcome| cost(outcome, |cost| cost.unprompted_deficit_mps),

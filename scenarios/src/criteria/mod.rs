@@ -19,5 +19,6 @@ pub use config::{FlagName, GateConfig};
 pub use event::{Event, EventError, EventExpression, Guide, GuideError};
 pub use expression::{Aggregate, Comparison, Expression, ExpressionError, Operator, Quantity, Side};
 pub use measure::{
-    EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag, SLOWED_FOR_REAR, SLOWED_MPS, SLOWED_UNPROMPTED,
+    EGO_COLLIDED, LEAD_BRAKED, MEASURES, Measure, MeasureKind, PairFlag, REAR_NEAR, SLOWED_FOR_REAR, SLOWED_MPS,
+    SLOWED_UNPROMPTED, UNPROMPTED_DEFICIT,
 };
