@@ -124,7 +124,7 @@ impl Relevance {
     /// Returns why the checks of slowing have no answer, if they have none.
     fn unknown_slowing(&self) -> Option<String> {
         if let Some(check) = self.of_slowing.iter().find(|check| check.needs_pairs() && !self.is_paired) {
-            return Some(format!("`{check}` compares with a baseline, which --paired adds"));
+            return Some(format!("`{check}` compares with a baseline, and there is none"));
         }
         let check = self.of_slowing.first().filter(|_| self.samples > 0 && self.counted == 0)?;
         Some(format!("no sample meets the condition of `{check}`"))
