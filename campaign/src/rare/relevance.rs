@@ -212,7 +212,10 @@ mod tests {
         assert_eq!(paired.not_judged(), Vec::<String>::new());
         let alone = Relevance { is_paired: false, ..paired };
         let reasons = alone.not_judged();
-        assert!(reasons.len() == 1 && reasons[0].contains(check) && reasons[0].contains("--paired"), "{reasons:?}");
+        assert!(
+            reasons.len() == 1 && reasons[0].contains(check) && reasons[0].ends_with("and there is none"),
+            "{reasons:?}"
+        );
     }
 
     #[test]
