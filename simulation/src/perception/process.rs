@@ -106,7 +106,8 @@ impl PerceptionProcess {
         let period_s = question.lidars.iter().map(|lidar| lidar.period_s).fold(f64::INFINITY, f64::min);
         // Without a LiDAR there is no period that it must keep.
         let period = Duration::try_from_secs_f64(period_s).unwrap_or(Duration::MAX);
-        let computing = self.computing.get_or_insert_with(|| ComputingTime::of_perception(period));
+        let process = child.id();
+        let computing = self.computing.get_or_insert_with(|| ComputingTime::of_perception(period, process));
         match computing.exceeded(spent) {
             Some(message) => Err(ProgramError::Slow(message)),
             None => Ok(parsed),

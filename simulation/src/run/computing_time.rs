@@ -65,6 +65,7 @@ const READ_EVERY: u32 = 25;
 pub(crate) struct ComputingTime {
     budget: Duration,
     most_late: f64,
+    most_computed: u32,
     spent: Duration,
     steps: u32,
     /// Number of steps whose wall time, without waiting, exceeded the budget.
@@ -85,13 +86,15 @@ impl ComputingTime {
     /// Returns the meter of a run whose steps may take this long.
     pub(crate) fn new(budget: Duration) -> Self {
         let (spent, thread) = (Duration::ZERO, Thread::default());
-        Self { budget, most_late: MOST_LATE, spent, steps: 0, late: 0, computed: 0, thread, has_begun: false }
+        let (most_late, most_computed) = (MOST_LATE, MOST_COMPUTED);
+        Self { budget, most_late, most_computed, spent, steps: 0, late: 0, computed: 0, thread, has_begun: false }
     }
 
-    /// Returns the meter of a perception whose scans are this far apart. Its processor time does
-    /// not count.
-    pub(crate) fn of_perception(period: Duration) -> Self {
-        Self { most_late: MOST_LATE_SCANS, thread: Thread::of(None), ..Self::new(period.max(control_period())) }
+    /// Returns the meter of a perception whose scans are this far apart, and which runs in the process
+    /// with this number. Its processor time does not count.
+    pub(crate) fn of_perception(period: Duration, process: u32) -> Self {
+        let meter = Self::new(period.max(control_period()));
+        Self { most_late: MOST_LATE_SCANS, most_computed: u32::MAX, thread: Thread::of(Some(process)), ..meter }
     }
 
     /// Calls `step`, and adds the time that it takes. `process` returns the process that answers; `None`
@@ -152,7 +155,7 @@ impl ComputingTime {
     /// count from `least_steps` on.
     fn judged(&self, least_steps: u32) -> Option<String> {
         let budget_ms = 1e3 * self.budget.as_secs_f64();
-        if self.computed > MOST_COMPUTED {
+        if self.computed > self.most_computed {
             return Some(format!(
                 "computes for more than its {budget_ms:.0} ms in {} of {} steps, by a quarter of them and by its own processor time, and may \
                  in one",
