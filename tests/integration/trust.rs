@@ -293,7 +293,7 @@ fn a_controller_that_fails_only_while_it_is_recorded_does_not_cost_the_verdict()
         let out = folder.path().join(name);
         let mut command = program();
         command
-            .args(["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--max-collisions", "4"])
+            .args(["campaign", "slow-approach", "-n", "80", "--sensors", "object", "--max-collisions", "4"])
             .args(["--record", "random:2", "--controller", &library, "--out", out.to_str().unwrap()])
             .args(more);
         let output = with_fault(&mut command, Some("recorded"));
@@ -314,7 +314,7 @@ fn a_recorded_run_that_is_not_the_run_of_the_campaign_makes_it_invalid() {
     let run = |name: &str, more: &[&str]| {
         let mut command = program();
         command
-            .args(["campaign", "overtake-without-brake", "-n", "80", "--sensors", "object", "--max-collisions", "4"])
+            .args(["campaign", "slow-approach", "-n", "80", "--sensors", "object", "--max-collisions", "4"])
             .args(["--controller", &library, "--out", &out(name)])
             .args(more);
         with_fault(&mut command, Some("recorded-otherwise"))
