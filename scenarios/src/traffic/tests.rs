@@ -118,7 +118,7 @@ fn what_is_wrong_is_named_with_what_is_allowed() {
             "ego-stack = { acc = { time-gap-s = 1.0 } }",
             "the drivers of the surrounding traffic are human",
         ),
-        ("id = 'other'", "id = 'Other'", "busy.toml:"),
+        ("id = 'other'", "id = 'an other'", "busy.toml:"),
         ("'$day'", "'$dya'", "names the parameter `$dya`"),
         ("truck = 0.2", "lorry = 0.2", "`truck`"),
         ("car = 0.8, truck = 0.2", "car = 0.0", "`traffic[0].classes.car` is missing: one class with a weight above 0"),
