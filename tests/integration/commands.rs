@@ -401,7 +401,7 @@ const FAILING: &str = "closecall-results 34";
 #[test]
 fn the_examples_of_the_help_work_on_the_results_of_a_first_campaign() {
     let folder = folder();
-    let words = ["campaign", "low-thw-overtake", "-n", "60", "--paired", "--no-gate", "--record", "failures:0"];
+    let words = ["campaign", "low-thw-overtake", "-n", "36", "--paired", "--no-gate", "--record", "failures:0"];
     stdout(&run_in(folder.path(), &words), 0);
     let mut run = Vec::new();
     for (_, command) in commands() {

@@ -363,13 +363,11 @@ fn the_sizes_in_the_examples_of_the_help_decide() {
         for line in text.lines().filter_map(|line| line.trim().strip_prefix("closecall campaign low-thw-overtake ")) {
             let words = Command::new("sh").args(["-c", &format!("printf '%s\\n' {line}")]).output().unwrap();
             let words = String::from_utf8(words.stdout).unwrap();
-            for seed in ["0", "1"] {
-                let more = ["--sensors", "object", "--no-validity-checks", "--seed", seed, "--no-out"];
-                let mut command = program();
-                command.args(["campaign", "low-thw-overtake"]).args(words.lines()).args(more);
-                let output = command.output().unwrap();
-                assert!([0, 1].contains(&code(&output)), "{line} --seed {seed}: {output:?}");
-            }
+            let more = ["--sensors", "object", "--no-validity-checks", "--seed", "0", "--no-out"];
+            let mut command = program();
+            command.args(["campaign", "low-thw-overtake"]).args(words.lines()).args(more);
+            let output = command.output().unwrap();
+            assert!([0, 1].contains(&code(&output)), "{line}: {output:?}");
             examples += 1;
         }
     }

@@ -17,7 +17,7 @@ use crate::support::{ROOT, code, folder, library, program, stderr};
 const WAYS: [&str; 5] = ["once", "always", "short", "interrupt", "kill"];
 /// One call in so many fails in the first way, and in each of the others, unless every call is to
 /// fail.
-const STRIDES: [usize; 2] = [3, 17];
+const STRIDES: [usize; 2] = [7, 37];
 /// Exit code of an I/O error.
 const IO_ERROR: i32 = 6;
 /// Ends of the names of files that hold times, or the process that writes.

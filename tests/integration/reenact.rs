@@ -140,12 +140,14 @@ fn an_encounter_that_cannot_be_re_enacted_is_refused_with_the_reason() {
 #[test]
 fn recorded_traffic_is_re_enacted_or_refused_with_the_reason() {
     let Some(data) = data() else { return };
-    let ngsim = ["ngsim_us101/trajectories/us101_a.csv", "ngsim_us101/us101_a_ngsim18col_feet.csv"];
-    for trajectories in ngsim.map(|file| data.join(file)) {
+    // Both have the same traffic: of the second, one lane change in four is enough.
+    let ngsim = [("ngsim_us101/trajectories/us101_a.csv", 1), ("ngsim_us101/us101_a_ngsim18col_feet.csv", 4)];
+    for (trajectories, stride) in ngsim.map(|(file, stride)| (data.join(file), stride)) {
         let changes =
             json(&closecall(["traffic", "lane-changes", trajectories.to_str().unwrap(), "--format", "json"]), 0);
+        let tried: Vec<_> = changes.as_array().unwrap().iter().step_by(stride).collect();
         let mut count = 0;
-        for change in changes.as_array().unwrap() {
+        for change in &tried {
             let track = change["track_id"].to_string();
             for rear in ["driver", "recorded"] {
                 let args = ["traffic", "reenact", trajectories.to_str().unwrap(), "--track", &track, "--rear", rear];
@@ -155,6 +157,6 @@ fn recorded_traffic_is_re_enacted_or_refused_with_the_reason() {
                 count += usize::from(code(&output) == 0);
             }
         }
-        assert!(count > changes.as_array().unwrap().len() / 2, "{}: {count}", trajectories.display());
+        assert!(count > tried.len() / 2, "{}: {count}", trajectories.display());
     }
 }
