@@ -21,7 +21,7 @@ use serde_json::Value;
 use crate::support::{closecall, code, folder, library, stderr, stdout, words_of_gate};
 
 /// Number of synthetic campaigns.
-const CAMPAIGNS: u64 = 160;
+const CAMPAIGNS: u64 = 500;
 /// The verdict that belongs to each exit code. A measurement has none.
 const VERDICTS: [(i32, &[&str]); 5] = [
     (0, &["PASS", "measured, not judged"]),
