@@ -103,13 +103,16 @@ fn a_clock_in_place_of_a_measured_approach_fails_the_headline() {
 }
 
 #[test]
-fn the_system_passes_the_headline_on_a_seed_that_nobody_tuned_on() {
-    let args = ["-n", "800", "--seed", "460", "--arms", "acc,blind,crawl,mis", "--sensors", "object"];
-    let text = stdout(&campaign(&library("low-thw-overtake"), &args), 0);
-    assert!(
-        text.contains("met: low-thw-overtake: MIS-9: share of ") && text.contains("[upper(slowed_unprompted) <= 0.05]"),
-        "{text}"
-    );
+fn the_system_passes_the_headline_on_seeds_that_nobody_tuned_on() {
+    for seed in ["460", "461"] {
+        let args = ["-n", "800", "--seed", seed, "--arms", "acc,blind,crawl,mis", "--sensors", "object"];
+        let text = stdout(&campaign(&library("low-thw-overtake"), &args), 0);
+        assert!(
+            text.contains("met: low-thw-overtake: MIS-9: share of ")
+                && text.contains("[upper(slowed_unprompted) <= 0.05]"),
+            "{text}"
+        );
+    }
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn is_cut_of(config: &ParameterConfig, committed: &ParameterConfig) -> bool {
 /// Samples of each scenario in which the lead vehicle does not brake.
 const SAMPLES: &str = "250";
 /// The same with the full chain.
-const SAMPLES_IN_FULL: &str = "4";
+const SAMPLES_IN_FULL: &str = "10";
 
 #[test]
 fn the_ego_does_not_collide_if_the_lead_vehicle_does_not_brake() {
@@ -119,7 +119,7 @@ fn the_ego_does_not_collide_if_the_lead_vehicle_does_not_brake() {
             continue;
         }
         let path = path.to_str().unwrap();
-        // Four samples do not decide the checks, but the ego must not collide in any of them.
+        // Ten samples do not decide the checks, but the ego must not collide in any of them.
         let in_full = ["-n", SAMPLES_IN_FULL, "--no-gate", "--no-validity-checks"];
         for (sensors, options) in [("object", &["-n", SAMPLES][..]), ("full", &in_full[..])] {
             let args = ["campaign", path, "--paired", "--sensors", sensors, "--format", "json"];
