@@ -57,7 +57,7 @@ impl Fingerprint {
     pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
         let greeted = scenario.and_then(|scenario| match &scenario.actors[scenario.ego].driver {
             CheckedDriver::Ego(ego) => {
-                let lane = scenario.road.lane_at(scenario.actors[scenario.ego].start.d_m);
+                let lane = scenario.road.lane_of(&scenario.actors[scenario.ego].start);
                 identify(settings, folder, ego, (&scenario.road, lane)).ok()
             }
             CheckedDriver::Human(_) => None,

@@ -131,8 +131,9 @@ class Setup:
         """The settings of the scenario's ego stack: ``acc``, ``aeb``, ``mis`` (``None`` where absent), ``automated``."""
     @property
     def road(self) -> Mapping[str, Any]:
-        """``lanes``, ``lane_width_m`` (of the ego's lane), ``lane_widths_m`` (of each lane, from lane 1 on), ``curvature_per_m``
-        (``None`` if it changes along the road), ``speed_limit_mps``, ``overtaking_side``."""
+        """``lanes``, ``lane_width_m`` (of the ego's lane), ``lane_widths_m`` (of each lane, from lane 1 on; of
+        ``road.cross-sections`` the greatest ones), ``curvature_per_m`` (``None`` if it changes along the road),
+        ``speed_limit_mps``, ``overtaking_side``."""
 
 @final
 class Odometry:

@@ -66,7 +66,7 @@ pub(crate) fn write(input: &EgoInput<'_>, front: Option<Front>, max_tracks: usiz
         odometry.length_m,
         odometry.width_m,
         f64::from(road.lanes()),
-        road.lane_width_m(odometry.lane),
+        road.greatest_lane_width_m(odometry.lane),
         road.speed_limit_mps(),
         input.curvature_per_m,
     ]);

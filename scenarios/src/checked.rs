@@ -69,10 +69,10 @@ impl Scenario {
     /// file on that side.
     pub fn lead_and_rear(&self) -> [Option<usize>; 2] {
         let ego = &self.actors[self.ego].start;
-        let lane = self.road.lane_at(ego.d_m);
+        let lane = self.road.lane_of(ego);
         let nearest = |side: f64| {
             let distances = self.actors.iter().enumerate().map(|(index, actor)| {
-                let is_in_lane = self.road.lane_at(actor.start.d_m) == lane;
+                let is_in_lane = self.road.lane_of(&actor.start) == lane;
                 let distance_m = side * (actor.start.s_m - ego.s_m);
                 (index, distance_m, if is_in_lane { distance_m } else { f64::INFINITY })
             });
@@ -294,7 +294,7 @@ impl ScenarioConfig {
             for (event_index, event) in actor.events.iter().enumerate() {
                 let locate = |error: ConfigError| at(index, error.within_index(event_index).within("event"));
                 let event = event.check(&start, parameters).map_err(locate)?;
-                let lane = road.lane_at(states[index].d_m);
+                let lane = road.lane_of(&states[index]);
                 event
                     .then
                     .check_lane_change(&actor.driver, lane, road)
@@ -416,8 +416,8 @@ fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) ->
 
 /// Rejects a vehicle that is wider than the lane in which it starts.
 fn check_room(vehicle: &Vehicle, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
-    let lane = road.lane_at(start.d_m);
-    let (width_m, lane_m) = (vehicle.dimensions.width_m, road.lane_width_m(lane));
+    let lane = road.lane_of(start);
+    let (width_m, lane_m) = (vehicle.dimensions.width_m, road.lane_width_m(lane, start.s_m));
     if width_m <= lane_m {
         return Ok(());
     }
@@ -430,7 +430,7 @@ fn check_room(vehicle: &Vehicle, start: &VehicleState, road: &Road) -> Result<()
 fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
     match driver {
         CheckedDriver::Human(HumanDriver::Prescribed(prescribed)) => prescribed
-            .check_lanes(road.lane_at(start.d_m), road)
+            .check_lanes(road.lane_of(start), road)
             .map_err(|error| error.within("prescribed").within("driver")),
         _ => Ok(()),
     }
@@ -451,7 +451,7 @@ impl Entering<'_> {
     /// starts in that lane.
     fn check(&self, road: &Road, friction: f64, duration: Time) -> Result<(), ConfigError> {
         let Some(lane) = road.acceleration_lane() else { return Ok(()) };
-        let number = road.lane_at(self.start.d_m);
+        let number = road.lane_of(self.start);
         if road.entry_lane() != Some(number) {
             return Ok(());
         }

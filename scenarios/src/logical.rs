@@ -231,6 +231,7 @@ fn config(approach: &Approach, name: &str, parameters: ParametersConfig) -> Resu
             lanes: approach.lanes,
             lane_width_m: LaneWidthsConfig::Equal(rounded(approach.lane_width_m)),
             curvature_per_m: Num::Fixed(0.0),
+            cross_sections: Vec::new(),
             alignment: Vec::new(),
             alignment_d_m: None,
             speed_limit_mps: rounded(highest("cruise-mps") + highest("closing-mps")),

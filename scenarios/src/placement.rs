@@ -62,7 +62,7 @@ pub(super) fn initial_states(
 fn on_path(state: VehicleState, path: Option<&LateralPath>, road: &Road) -> Result<VehicleState, ConfigError> {
     let Some(path) = path else { return Ok(state) };
     let [d_m, slope, _] = path.at(0.0);
-    let [on_path, at_start] = [d_m, state.d_m].map(|d_m| road.lane_at(d_m));
+    let [on_path, at_start] = [d_m, state.d_m].map(|d_m| road.lane_at(state.s_m, d_m));
     if on_path == at_start {
         return Ok(VehicleState { d_m, heading_rad: maths::atan(slope), ..state });
     }
@@ -128,8 +128,9 @@ impl Placement<'_> {
             StartConfig::Absolute(start) => {
                 let number =
                     |num, key, range| self.parameters.number(num, key, range).map_err(|error| error.within("absolute"));
-                let d_m = self.lane_centre_m(start.lane).map_err(|error| error.within("absolute"))?;
                 let s_m = number(&start.s_m, "s-m", POSITION_RANGE_M)?;
+                let lane = self.lane(start.lane, s_m).map_err(|error| error.within("absolute"))?;
+                let [d_m, ..] = self.road.driving_line(lane, s_m);
                 let speed_mps = number(&start.speed_mps, "speed-mps", SPEED_RANGE_MPS)?;
                 let acceleration = start.acceleration_mps2.as_ref();
                 let acceleration_mps2 =
@@ -175,11 +176,16 @@ impl Placement<'_> {
             }
         };
         let [length_m, other_length_m] = [index, other].map(|index| self.vehicles[index].dimensions.length_m);
+        let s_m = reference.s_m + direction * (gap_m + touching_distance_m(length_m, other_length_m));
+        let line_m = |lane, s_m| self.road.driving_line(lane, s_m)[0];
         let d_m = match start.lane {
-            Some(lane) => self.lane_centre_m(lane)?,
+            Some(lane) => line_m(self.lane(lane, s_m)?, s_m),
+            None if self.road.has_changing_lanes() => {
+                let lane = self.road.lane_of(&reference);
+                reference.d_m + (line_m(lane, s_m) - line_m(lane, reference.s_m))
+            }
             None => reference.d_m,
         };
-        let s_m = reference.s_m + direction * (gap_m + touching_distance_m(length_m, other_length_m));
         Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
     }
 
@@ -217,12 +223,19 @@ impl Placement<'_> {
         find_actor(&ids, id, "of")
     }
 
-    fn lane_centre_m(&self, lane: Lane) -> Result<f64, ConfigError> {
-        if (1..=self.road.lanes()).contains(&lane.0) {
-            Ok(self.road.lane_centre_m(lane))
-        } else {
-            Err(ConfigError::new("lane", Problem::UnknownLane { value: lane.0, lanes: self.road.lanes() }))
+    /// Returns a lane that the road has, and in which vehicles have room at `s_m`.
+    fn lane(&self, lane: Lane, s_m: f64) -> Result<Lane, ConfigError> {
+        if !(1..=self.road.lanes()).contains(&lane.0) {
+            return Err(ConfigError::new("lane", Problem::UnknownLane { value: lane.0, lanes: self.road.lanes() }));
         }
+        if self.road.is_open(lane, [s_m; 2]) {
+            return Ok(lane);
+        }
+        let [width_m, least_m] = [self.road.lane_width_m(lane, s_m), Road::LANE_WIDTH_M.low()];
+        let rule = format!(
+            "lane {lane} is {width_m:.2} m wide at {s_m} m, and a vehicle starts in a lane of {least_m} m or more"
+        );
+        Err(ConfigError::new("lane", Problem::Contradiction { other: "road.cross-sections", rule }))
     }
 }
 

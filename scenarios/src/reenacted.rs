@@ -184,6 +184,7 @@ pub(super) fn with_actors(encounter: &RecordedEncounter, title: Title, actors: V
             lanes: encounter.lanes,
             lane_width_m: LaneWidthsConfig::Equal(rounded(encounter.lane_width_m)),
             curvature_per_m: Num::Fixed(0.0),
+            cross_sections: Vec::new(),
             alignment: Vec::new(),
             alignment_d_m: None,
             speed_limit_mps: rounded(max_speed_mps(encounter.vehicles.iter().map(|vehicle| &vehicle.trajectory))),

@@ -110,20 +110,21 @@ pub(super) fn add(
         let mut rng = stream(block.draw.to_bits(), 0, &id, CHANNEL);
         let drawn = block.draw_vehicle(&mut rng);
         let turn = number as usize % config.lanes.len();
-        let d_m = road.lane_centre_m(config.lanes[turn]);
         let length_m = drawn.vehicle.dimensions.length_m;
         let wanted_m = match ends[turn] {
             Some(rear) => rear.s_m + touching_distance_m(rear.length_m, length_m) + drawn.thw_s * rear.speed_mps,
             // The first vehicles of the lanes are not abreast.
             None => from_m + rng.random::<f64>() * block.mean_thw_s * block.speed_mps,
         };
-        let start = VehicleState { d_m, speed_mps: drawn.speed_mps, ..VehicleState::default() };
-        let s_m = block.free_position_m(actors, &drawn.vehicle, VehicleState { s_m: wanted_m, ..start });
+        let line = |s_m| road.driving_line(config.lanes[turn], s_m)[0];
+        let start = VehicleState { speed_mps: drawn.speed_mps, ..VehicleState::default() };
+        let wanted = VehicleState { s_m: wanted_m, d_m: line(wanted_m), ..start };
+        let s_m = block.free_position_m(actors, &drawn.vehicle, wanted);
         ends[turn] = Some(Rear { s_m, length_m, speed_mps: drawn.speed_mps });
         actors.push(Actor {
             id,
             vehicle: drawn.vehicle,
-            start: VehicleState { s_m, ..start },
+            start: VehicleState { s_m, d_m: line(s_m), ..start },
             driver: block.driver.clone(),
             path: None,
             lane_keeping: None,

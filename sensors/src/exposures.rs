@@ -97,7 +97,14 @@ struct HeldImage {
 impl HeldImage {
     fn of(scene: &Scene<'_>, key: ExposureKey) -> Self {
         let Scene { time, ego, .. } = *scene;
-        Self { time, environment: *scene.environment, road: *scene.road, ego, others: scene.others.to_vec(), key }
+        Self {
+            time,
+            environment: *scene.environment,
+            road: scene.road.clone(),
+            ego,
+            others: scene.others.to_vec(),
+            key,
+        }
     }
 
     fn scene(&self) -> Scene<'_> {

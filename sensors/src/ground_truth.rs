@@ -64,7 +64,7 @@ impl Perception for GroundTruth {
                 width_m: other.width_m,
                 class: ClassScores::certain(other.class),
                 existence: 1.0,
-                lane: frame.lane_probabilities(other.road_m[1], 0.0),
+                lane: frame.lane_probabilities(other.road_m[0], other.road_m[1], 0.0),
             });
         }
         Ok(&self.tracks)

@@ -154,15 +154,16 @@ pub(super) fn perceive(args: &PerceiveArgs) -> Result<ExitCode, CliError> {
         Frame::Ego => PointFrame::Ego,
         Frame::Sensor => PointFrame::Sensor,
     };
-    let lane = scenario.road.lane_at(scenario.actors[scenario.ego].start.d_m);
+    let start = &scenario.actors[scenario.ego].start;
+    let lane = scenario.road.lane_of(start);
     let input = RecordedInput {
         recording,
         lidars,
         poses: &poses,
         labels: labels.as_ref(),
         perception: RecordedPerception::new(&scenario.sensors, frame, ego.dimensions.length_m),
-        road: scenario.road,
-        lane_d_m: scenario.road.lane_centre_m(lane),
+        road: scenario.road.clone(),
+        lane_d_m: scenario.road.lane_centre_m(lane, start.s_m),
         ego,
     };
     let mut recorder = TrackRecorder::default();

@@ -154,7 +154,7 @@ impl Observer for Crossing {
         let [ego, rear] = ["ego", "rear"].map(|id| &view.vehicles[index(id)]);
         let lengths_m = ego.vehicle.dimensions.length_m + rear.vehicle.dimensions.length_m;
         let thw_s = (ego.state.s_m - rear.state.s_m - 0.5 * lengths_m) / rear.state.speed_mps;
-        let marking_m = view.scenario.road.boundary_m(1);
+        let marking_m = view.scenario.road.full_boundary_m(1, 0.0);
         let beyond_m = rear.state.d_m - marking_m;
         if let (Some((beyond_before_m, thw_before_s)), None) = (self.before, self.thw_s)
             && beyond_m >= 0.0

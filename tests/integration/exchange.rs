@@ -53,7 +53,7 @@ fn the_open_loop_form_has_the_positions_of_the_trace() {
         .map(|AlignmentPoint { s_m, curvature_per_m }| format!("{{s-m={s_m:?},curvature-per-m={curvature_per_m:?}}}"));
     let straight = Road::straight(3);
     let roads = [
-        ("curvature-per-m=0.0".to_owned(), straight),
+        ("curvature-per-m=0.0".to_owned(), straight.clone()),
         ("curvature-per-m=0.002".to_owned(), straight.with_curvature(0.002)),
         (format!("alignment=[{}]", written.join(",")), straight.with_alignment(Alignment::new(&points).unwrap())),
     ];

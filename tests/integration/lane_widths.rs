@@ -70,11 +70,13 @@ impl Observer for SeenInLane {
         let road = &view.scenario.road;
         let [ego, _, rear] = view.vehicles else { unreachable!("the scenario has three vehicles") };
         let (behind_m, beside_m) = (ego.state.s_m - rear.state.s_m, rear.state.d_m - ego.state.d_m);
-        let to_edge_m = (0..=3).map(|number| (road.boundary_m(number) - rear.state.d_m).abs()).fold(9.9, f64::min);
+        let to_edge_m = (0..=3)
+            .map(|number| (road.full_boundary_m(number, rear.state.s_m) - rear.state.d_m).abs())
+            .fold(9.9, f64::min);
         if !(15.0..60.0).contains(&behind_m) || to_edge_m < 0.6 {
             return;
         }
-        let lane = usize::from(road.lane_at(rear.state.d_m).0) - 1;
+        let lane = usize::from(road.lane_of(&rear.state).0) - 1;
         let is_rear = |track: &&Track| {
             let is_near = (track.x_m() + behind_m).abs() < 8.0 && (track.y_m() - beside_m).abs() < 1.5;
             track.source == Source::Rear && is_near

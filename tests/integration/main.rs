@@ -16,6 +16,7 @@ mod campaign_example;
 mod causes;
 mod chain;
 mod changed_controller;
+mod changing_lanes;
 mod ci_templates;
 mod circles;
 mod commands;

@@ -1302,7 +1302,9 @@ fn a_vehicle_drives_only_where_the_road_has_its_lane() {
     let of = |road: &str| imported(&written(folder.path(), SCENARIO, road), &output, &[]);
     // The truck leaves lane -2 at 3 s, 170 m along the road.
     let said = stdout(&of(&with_second_section(400.0, &[-1])), 0);
-    assert!(said.contains("lanes that begin or end: the lane section at 50 m gives the lanes"), "{said}");
+    let note =
+        "lanes that begin or end (a boundary jumps by 3.50 m at 400 m): the lane section at 50 m gives the lanes";
+    assert!(said.contains(note), "{said}");
     assert_eq!(road_of(&output)["lanes"].as_integer(), Some(2));
     json(&closecall(["run", output.to_str().unwrap(), "--sensors", "ground-truth", "--format", "json"]), 0);
     // A lane that begins before the vehicles is there, and a section with the same lanes needs no note.
@@ -1332,7 +1334,7 @@ fn a_vehicle_drives_only_where_the_road_has_its_lane() {
 }
 
 #[test]
-fn the_lanes_have_the_width_at_the_start_and_the_road_one_limit() {
+fn the_lanes_have_the_widths_and_places_of_the_file_and_the_road_one_limit() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
     let of = |road: &str| imported(&written(folder.path(), SCENARIO, road), &output, &[]);
@@ -1342,9 +1344,16 @@ fn the_lanes_have_the_width_at_the_start_and_the_road_one_limit() {
     let road = ROAD.replace("<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>", narrows);
     assert_ne!(road, ROAD);
     let said = stdout(&of(&road), 0);
-    assert!(said.contains("lanes whose width changes: each has the width at 50 m"), "{said}");
-    assert!(!said.contains("lanes of other widths"), "{said}");
-    assert_eq!(road_of(&output)["lane-width-m"].as_float(), Some(3.25));
+    assert!(!said.contains("lanes whose width") && !said.contains("lanes of other widths"), "{said}");
+    assert_eq!(road_of(&output).get("lane-width-m"), None);
+    let sections = |text: &str| toml::from_str::<toml::Table>(text).unwrap()["cross-sections"].clone();
+    let expected = "cross-sections = [{ s-m = 0.0, widths-m = [3.5, 3.5] }, { s-m = 40.0, widths-m = [3.25, 3.25] }, \
+                    { s-m = 3000.0, widths-m = [3.25, 3.25] }]";
+    assert_eq!(road_of(&output)["cross-sections"], sections(expected));
+    // Lanes that become too wide have the widths of the start.
+    let said = stdout(&of(&road.replace("a=\"3.25\"", "a=\"3.25\" b=\"0.001\"").replace(" b=\"0\" c", " c")), 0);
+    let note = "lanes whose width changes (lane -1 is up to 6.21 m wide, and 2.5 to 5 m are allowed): each has the width at 50 m";
+    assert!(said.contains(note), "{said}");
 
     let speed = "<speed sOffset=\"0\" max=\"80\" unit=\"km/h\"/></lane>";
     let said =
@@ -1353,7 +1362,11 @@ fn the_lanes_have_the_width_at_the_start_and_the_road_one_limit() {
     assert!((road_of(&output)["speed-limit-mps"].as_float().unwrap() - 120.0 / 3.6).abs() < 1e-9);
     let offset = "<lanes><laneOffset s=\"0\" a=\"0\" b=\"0.01\" c=\"0\" d=\"0\"/>";
     let said = stdout(&of(&ROAD.replacen("<lanes>", offset, 1)), 0);
-    assert!(said.contains("a lane offset that changes: the lanes have the offset at 50 m"), "{said}");
+    assert!(!said.contains("offset"), "{said}");
+    let expected = "cross-sections = [{ s-m = 0.0, widths-m = [3.5, 3.5], left-edge-d-m = -30.0 }, \
+                    { s-m = 3000.0, widths-m = [3.5, 3.5] }]";
+    assert_eq!(road_of(&output)["cross-sections"], sections(expected));
+    assert_eq!(road_of(&output)["alignment-d-m"].as_float(), Some(-30.0));
     fs::remove_file(&output).unwrap();
     for (wrong, word) in [
         (road.replace("a=\"3.25\"", "a=\"2.25\""), "`width`: at 50 m it is 2.25; a lane of a scenario has a width of"),

@@ -44,9 +44,9 @@ impl Observer for Watch<'_> {
         let road = &self.scenario.road;
         let (lane, entry) = (road.acceleration_lane().unwrap(), road.entry_lane().unwrap());
         let front_m = state.s_m + 0.5 * self.scenario.actors[self.actor].vehicle.dimensions.length_m;
-        if road.lane_at(state.d_m) == entry {
+        if road.lane_of(&state) == entry {
             assert!(front_m <= lane.taper_end_m, "at {time}: {front_m} m");
-            if (state.d_m - road.lane_centre_m(entry)).abs() < IN_LANE_M {
+            if (state.d_m - road.lane_centre_m(entry, state.s_m)).abs() < IN_LANE_M {
                 assert!(front_m <= lane.to_m + ON_THE_WAY_M, "at {time}: {front_m} m");
             }
         } else if self.crossed_m.is_none() {
@@ -67,12 +67,12 @@ fn vehicles_merge_from_the_ramp_before_the_acceleration_lane_ends() {
         let scenario = concrete(&file, sampling, index).unwrap();
         let actor = scenario.actors.iter().position(|actor| actor.id.as_str() == "ramp").unwrap();
         let start = scenario.actors[actor].start;
-        assert_eq!(scenario.road.lane_at(start.d_m), Lane(3));
+        assert_eq!(scenario.road.lane_of(&start), Lane(3));
         let mut watch = Watch { scenario: &scenario, actor, last: start, crossed_m: None };
         let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: Some(SensorMode::Object) };
         simulate(&scenario, key, &arm, &mut watch).unwrap();
         let lane = scenario.road.acceleration_lane().unwrap();
-        merged += u32::from(scenario.road.lane_at(watch.last.d_m) == Lane(2));
+        merged += u32::from(scenario.road.lane_of(&watch.last) == Lane(2));
         in_first_half += u32::from(watch.crossed_m.is_some_and(|at_m| at_m < 0.5 * (lane.from_m + lane.to_m)));
     }
     // A run ends 2 s after a collision, which may be before the vehicle has merged.

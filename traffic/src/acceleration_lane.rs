@@ -67,33 +67,8 @@ impl AccelerationLane {
         ((self.taper_end_m - s_m) / (self.taper_end_m - self.to_m)).clamp(0.0, 1.0)
     }
 
-    /// Divides a part of the road into stretches (m), so that on each stretch the width changes
-    /// linearly or not at all. Returns the starts and ends.
-    pub fn stretches_m(lane: Option<&Self>, [from_m, to_m]: [f64; 2]) -> Vec<[f64; 2]> {
-        let ends_m = lane.map(|lane| [lane.to_m, lane.taper_end_m]).into_iter().flatten();
-        let mut starts_m = vec![from_m];
-        starts_m.extend(ends_m.filter(|end_m| from_m < *end_m && *end_m < to_m));
-        let ends_m = starts_m.iter().skip(1).copied().chain([to_m]);
-        starts_m.iter().copied().zip(ends_m).map(|(start_m, end_m)| [start_m, end_m]).collect()
-    }
-
     /// Returns the same lane with other positions along the road (m).
     pub(crate) fn moved(self, to: impl Fn(f64) -> f64) -> Self {
         Self { from_m: to(self.from_m), to_m: to(self.to_m), taper_end_m: to(self.taper_end_m) }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_stretches_of_a_part_end_where_the_width_begins_or_ends_to_change() {
-        let lane = AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };
-        let stretches = |from_m, to_m| AccelerationLane::stretches_m(Some(&lane), [from_m, to_m]);
-        assert_eq!(stretches(0.0, 500.0), [[0.0, 350.0], [350.0, 410.0], [410.0, 500.0]]);
-        assert_eq!(stretches(360.0, 400.0), [[360.0, 400.0]]);
-        assert_eq!(stretches(500.0, 600.0), [[500.0, 600.0]]);
-        assert_eq!(AccelerationLane::stretches_m(None, [0.0, 500.0]), [[0.0, 500.0]]);
     }
 }

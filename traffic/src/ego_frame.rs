@@ -50,7 +50,15 @@ impl<'a> EgoFrame<'a> {
     /// Creates the frame of an ego with this state.
     pub fn new(road: &'a Road, ego: &VehicleState) -> Self {
         let (sin, cos) = maths::sin_cos(ego.heading_rad);
-        Self { road, s_m: ego.s_m, d_m: ego.d_m, heading_rad: ego.heading_rad, sin, cos, lane: road.lane_at(ego.d_m) }
+        Self {
+            road,
+            s_m: ego.s_m,
+            d_m: ego.d_m,
+            heading_rad: ego.heading_rad,
+            sin,
+            cos,
+            lane: road.lane_at(ego.s_m, ego.d_m),
+        }
     }
 
     /// Transforms the road point (s, d) into the ego's frame.
@@ -120,13 +128,13 @@ impl<'a> EgoFrame<'a> {
     /// Returns the probabilities that a vehicle is in the lane left of the ego's, in the ego's
     /// lane, and in the lane right of the ego's.
     ///
-    /// A vehicle counts as being in a lane if its centre is. The centre lies at `d_m` with the
-    /// standard deviation `sd_m`.
-    pub fn lane_probabilities(&self, d_m: f64, sd_m: f64) -> [f64; 3] {
+    /// A vehicle counts as being in a lane if its centre is. The centre lies at (`s_m`, `d_m`), across
+    /// the road with the standard deviation `sd_m`.
+    pub fn lane_probabilities(&self, s_m: f64, d_m: f64, sd_m: f64) -> [f64; 3] {
         let lanes =
             [self.road.beside(self.lane, Side::Left), Some(self.lane), self.road.beside(self.lane, Side::Right)];
-        let [left_m, own_m, right_m] = lanes.map(|lane| lane.map_or(0.0, |lane| self.road.lane_width_m(lane)));
-        let edge_m = self.road.lane_centre_m(self.lane) + 0.5 * own_m;
+        let [left_m, own_m, right_m] = lanes.map(|lane| lane.map_or(0.0, |lane| self.road.lane_width_m(lane, s_m)));
+        let edge_m = self.road.lane_centre_m(self.lane, s_m) + 0.5 * own_m;
         // Probabilities that the centre lies to the right of each of the four edges of these lanes,
         // from left to right.
         let edges_m = [edge_m + left_m, edge_m, edge_m - own_m, edge_m - (own_m + right_m)];
@@ -198,10 +206,10 @@ mod tests {
         let road = Road::straight(3);
         let state = ego(-5.6, 0.0);
         let frame = EgoFrame::new(&road, &state);
-        assert_eq!(frame.lane_probabilities(-1.9, 0.0), [1.0, 0.0, 0.0]);
-        assert_eq!(frame.lane_probabilities(-5.0, 0.1), [0.0, 1.0, 0.0]);
-        assert_eq!(frame.lane_probabilities(-9.0, 0.0), [0.0, 0.0, 1.0]);
-        let [left, own, right] = frame.lane_probabilities(-3.75, 0.5);
+        assert_eq!(frame.lane_probabilities(3_000.0, -1.9, 0.0), [1.0, 0.0, 0.0]);
+        assert_eq!(frame.lane_probabilities(3_000.0, -5.0, 0.1), [0.0, 1.0, 0.0]);
+        assert_eq!(frame.lane_probabilities(3_000.0, -9.0, 0.0), [0.0, 0.0, 1.0]);
+        let [left, own, right] = frame.lane_probabilities(3_000.0, -3.75, 0.5);
         assert!((left - 0.5).abs() < 1e-9 && (own - 0.5).abs() < 1e-9 && right == 0.0);
     }
 
@@ -220,7 +228,7 @@ mod tests {
             (-10.4, [0.0, 0.0, 1.0]),
             (-10.6, [0.0, 0.0, 0.0]),
         ] {
-            assert_eq!(frame.lane_probabilities(d_m, 0.0), expected, "{d_m}");
+            assert_eq!(frame.lane_probabilities(3_000.0, d_m, 0.0), expected, "{d_m}");
         }
     }
 
@@ -229,7 +237,7 @@ mod tests {
         let road = Road::straight(2);
         let state = ego(-1.9, 0.0);
         let frame = EgoFrame::new(&road, &state);
-        assert_eq!(frame.lane_probabilities(0.5, 0.0), [0.0, 0.0, 0.0]);
-        assert_eq!(frame.lane_probabilities(-5.6, 0.0), [0.0, 0.0, 1.0]);
+        assert_eq!(frame.lane_probabilities(3_000.0, 0.5, 0.0), [0.0, 0.0, 0.0]);
+        assert_eq!(frame.lane_probabilities(3_000.0, -5.6, 0.0), [0.0, 0.0, 1.0]);
     }
 }

@@ -105,8 +105,8 @@ pub use parameters::{Parameters, Value, readable};
 pub use quintic::{MINIMUM_JERK_PEAK, Quintic, minimum_jerk};
 pub use random::{Exp1, StandardNormal};
 pub use road::{
-    Alignment, AlignmentPiece, AlignmentPoint, AlignmentPointConfig, Lane, LaneWidthsConfig, NoLaneBeside, PlanePose,
-    Road, RoadConfig, Side,
+    Alignment, AlignmentPiece, AlignmentPoint, AlignmentPointConfig, CrossSectionConfig, Lane, LaneWidthsConfig,
+    NoLaneBeside, PlanePose, Road, RoadConfig, Side,
 };
 pub use roadside::{Roadside, RoadsideConfig};
 pub use scene::{Scene, SceneVehicle};

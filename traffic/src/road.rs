@@ -9,7 +9,8 @@
 //! ```
 //!
 //! Lanes of their own widths lie beside each other in the same way: the right edge of lane k is at
-//! d = −(w₁ + … + w_k).
+//! d = −(w₁ + … + w_k). If the widths change along the road, d = 0 is the leftmost place of the left
+//! edge, and the right edge of the road is the rightmost place of the right edge of the lanes.
 //!
 //! The reference line is d = 0. Its curvature is positive if the road bends to the left. It is
 //! constant, or follows an [`Alignment`] of lines, arcs and clothoids. An alignment can lie beside
@@ -24,16 +25,19 @@ use serde::{Deserialize, Serialize};
 
 mod alignment;
 mod course;
+mod cross_sections;
 mod widths;
 
 pub use alignment::{Alignment, AlignmentPiece, AlignmentPoint, AlignmentPointConfig};
 pub(crate) use course::{Course, OffsetLine};
+pub use cross_sections::CrossSectionConfig;
+use cross_sections::CrossSections;
 pub use widths::LaneWidthsConfig;
 use widths::{LaneWidths, MOST_LANES};
 
 use crate::acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
-use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig, maths};
+use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig, VehicleState, maths};
 
 /// A lateral side: left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -107,10 +111,14 @@ pub struct RoadConfig {
     /// (leftmost) on.
     #[serde(default = "default_lane_width")]
     pub lane_width_m: LaneWidthsConfig,
+    /// The lanes at positions along the road, between which their boundaries are lines: 1 to 4096
+    /// instead of `lane-width-m`. The positions increase by 1 m or more. Default: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cross_sections: Vec<CrossSectionConfig>,
     /// Curvature of the left edge (1/m), positive if the road bends to the left.
     #[serde(default = "default_curvature")]
     pub curvature_per_m: Num,
-    /// The points between which the curvature changes linearly, 2 to 64 instead of `curvature-per-m`:
+    /// The points between which the curvature changes linearly, 2 to 4096 instead of `curvature-per-m`:
     /// lines, arcs and clothoids. The positions increase by 1 m or more; a position that occurs twice
     /// is a jump. Default: none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -151,7 +159,7 @@ fn default_overtaking_side() -> Side {
 }
 
 /// A checked road.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Road {
     lanes: u8,
     widths: LaneWidths,
@@ -196,9 +204,17 @@ impl Check for RoadConfig {
             let rule = "it is the place of the alignment, and the road has none".to_owned();
             return Err(ConfigError::new("alignment-d-m", Problem::Contradiction { other: "alignment", rule }));
         }
+        let widths = match self.cross_sections.is_empty() {
+            true => self.lane_width_m.check(self.lanes, parameters)?,
+            false if self.lane_width_m != default_lane_width() => {
+                let rule = "each lane has one width, or the road has cross-sections: one of both".to_owned();
+                return Err(ConfigError::new("lane-width-m", Problem::Contradiction { other: "cross-sections", rule }));
+            }
+            false => LaneWidths::Along(CrossSections::check(&self.cross_sections, self.lanes, parameters)?),
+        };
         Ok(Road {
             lanes: self.lanes,
-            widths: self.lane_width_m.check(self.lanes, parameters)?,
+            widths,
             course,
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
@@ -222,6 +238,8 @@ impl Road {
     /// radius at which the small-angle lane geometry still holds. An alignment has
     /// [`Alignment::CURVATURE_PER_M`].
     pub const CURVATURE_PER_M: Range = Range::closed(-0.0025, 0.0025);
+    /// Steepest boundary of lanes whose widths change (m/m).
+    pub const STEEPEST_BOUNDARY: f64 = cross_sections::STEEPEST;
     /// Lateral positions of an alignment (m): a reference line in the middle of a road with 8 lanes
     /// per direction lies this far from their edge.
     pub const ALIGNMENT_D_M: Range = Range::closed(-50.0, 50.0);
@@ -244,32 +262,32 @@ impl Road {
 
     /// Returns the same road with one curvature everywhere (1/m), clamped to ±0.0025.
     #[must_use]
-    pub fn with_curvature(self, curvature_per_m: f64) -> Self {
-        Self { course: Course::Constant(curvature_per_m.clamp(-0.0025, 0.0025)), ..self }
+    pub fn with_curvature(&self, curvature_per_m: f64) -> Self {
+        Self { course: Course::Constant(curvature_per_m.clamp(-0.0025, 0.0025)), ..self.clone() }
     }
 
     /// Returns the same road with this alignment of its left edge.
     #[must_use]
-    pub fn with_alignment(self, line: Alignment) -> Self {
+    pub fn with_alignment(&self, line: Alignment) -> Self {
         self.with_alignment_at(line, 0.0)
     }
 
     /// Returns the same road with an alignment at the lateral position `d_m`, which is clamped to
     /// ±50 m.
     #[must_use]
-    pub fn with_alignment_at(self, line: Alignment, d_m: f64) -> Self {
-        Self { course: Course::Varying(OffsetLine { line, d_m: d_m.clamp(-50.0, 50.0) }), ..self }
+    pub fn with_alignment_at(&self, line: Alignment, d_m: f64) -> Self {
+        Self { course: Course::Varying(OffsetLine { line, d_m: d_m.clamp(-50.0, 50.0) }), ..self.clone() }
     }
 
     /// Returns the same road with another curvature by `added_per_m` (1/m) at each position. The
     /// results are clamped to the range of a road of its kind.
     #[must_use]
-    pub fn with_added_curvature(self, added_per_m: f64) -> Self {
-        match self.course {
+    pub fn with_added_curvature(&self, added_per_m: f64) -> Self {
+        match &self.course {
             Course::Constant(curvature_per_m) => self.with_curvature(curvature_per_m + added_per_m),
             Course::Varying(OffsetLine { line, d_m }) => {
                 let line = line.bent(|curvature_per_m| (curvature_per_m + added_per_m).clamp(-0.004, 0.004));
-                Self { course: Course::Varying(OffsetLine { line, d_m }), ..self }
+                Self { course: Course::Varying(OffsetLine { line, d_m: *d_m }), ..self.clone() }
             }
         }
     }
@@ -277,45 +295,56 @@ impl Road {
     /// Returns the same road with as many lanes as these widths (m), 1 to 8 of them. Each width is
     /// clamped to 2.5 to 5 m, and belongs to a lane from lane 1 on.
     #[must_use]
-    pub fn with_lane_widths(self, widths_m: &[f64]) -> Self {
+    pub fn with_lane_widths(&self, widths_m: &[f64]) -> Self {
         let widths_m: Vec<f64> = widths_m.iter().take(MOST_LANES).map(|width_m| clamped_width_m(*width_m)).collect();
         match u8::try_from(widths_m.len()) {
-            Ok(lanes) if lanes > 0 => Self { lanes, widths: LaneWidths::new(&widths_m), ..self },
-            _ => self,
+            Ok(lanes) if lanes > 0 => Self { lanes, widths: LaneWidths::new(&widths_m), ..self.clone() },
+            _ => self.clone(),
         }
     }
 
     /// Returns the same road with lanes that are wider by `added_m` (m). The results are clamped to
     /// 2.5 to 5 m.
     #[must_use]
-    pub fn with_added_lane_width(self, added_m: f64) -> Self {
+    pub fn with_added_lane_width(&self, added_m: f64) -> Self {
         let widths = self.widths.changed(self.lanes, |width_m| clamped_width_m(width_m + added_m));
-        Self { widths, ..self }
+        Self { widths, ..self.clone() }
+    }
+
+    /// Returns the same road with lanes whose widths change along it. Each cross-section has its position
+    /// (m), the lateral position of the left edge of lane 1 (m, 0 or negative), and the width of each
+    /// lane (m); the positions increase. Without a cross-section the road is the same.
+    #[must_use]
+    pub fn with_cross_sections(&self, sections: &[(f64, f64, Vec<f64>)]) -> Self {
+        match CrossSections::new(sections) {
+            Some(along) => Self { widths: LaneWidths::Along(along), ..self.clone() },
+            None => self.clone(),
+        }
     }
 
     /// Returns the same road with an acceleration lane, which is one of its lanes. A road of one lane
     /// has none.
     #[must_use]
-    pub fn with_acceleration_lane(self, lane: AccelerationLane) -> Self {
-        Self { acceleration_lane: (self.lanes > 1).then_some(lane), ..self }
+    pub fn with_acceleration_lane(&self, lane: AccelerationLane) -> Self {
+        Self { acceleration_lane: (self.lanes > 1).then_some(lane), ..self.clone() }
     }
 
     /// Returns the mirror image of a straight road: vehicles overtake on the other side, and lane 1
     /// corresponds to the original's last lane. Returns `None` for a curved road, because positions
     /// are measured along its left edge, which is the right edge of the mirror image.
-    pub fn mirrored(self) -> Option<Self> {
+    pub fn mirrored(&self) -> Option<Self> {
         let overtaking_side = self.overtaking_side.opposite();
-        let widths = self.widths.reversed(self.lanes);
-        self.is_straight().then_some(Self { overtaking_side, widths, ..self })
+        let widths = self.widths.reversed(self.lanes, |s_m| s_m);
+        self.is_straight().then(|| Self { overtaking_side, widths, ..self.clone() })
     }
 
     /// Returns the same road in the opposite direction: s runs against the traffic, and d = 0 is
     /// the right edge of the traffic.
     #[must_use]
-    pub fn reversed(self) -> Self {
+    pub fn reversed(&self) -> Self {
         // The original's right edge has another curvature than its left edge. Passed the other way,
         // it bends to the other side.
-        let course = match self.course {
+        let course = match &self.course {
             Course::Constant(curvature) => Course::Constant(-curvature / (1.0 - curvature * self.right_edge_m())),
             Course::Varying(OffsetLine { line, d_m }) => {
                 Course::Varying(OffsetLine { line: line.reversed(), d_m: self.right_edge_m() - d_m })
@@ -324,8 +353,9 @@ impl Road {
         let overtaking_side = self.overtaking_side.opposite();
         let acceleration_lane =
             self.acceleration_lane.map(|lane| lane.moved(|s_m| self.reversed_position_m(s_m, 0.0).0));
-        let widths = self.widths.reversed(self.lanes);
-        Self { course, overtaking_side, acceleration_lane, widths, is_reversed: !self.is_reversed, ..self }
+        let widths = self.widths.reversed(self.lanes, |s_m| self.reversed_position_m(s_m, 0.0).0);
+        let is_reversed = !self.is_reversed;
+        Self { course, overtaking_side, acceleration_lane, widths, is_reversed, ..self.clone() }
     }
 
     /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point
@@ -358,34 +388,59 @@ impl Road {
         self.lanes
     }
 
-    /// Returns the width of a lane (m). An acceleration lane has it where it does not narrow.
-    pub fn lane_width_m(&self, lane: Lane) -> f64 {
-        self.widths.width_m(lane.0)
+    /// Returns the width of a lane at a position along the road (m). An acceleration lane has its full
+    /// width.
+    pub fn lane_width_m(&self, lane: Lane, s_m: f64) -> f64 {
+        self.widths.width_m(lane.0, s_m)
     }
 
-    /// Returns the widths of the lanes (m), from lane 1 on.
-    pub fn lane_widths_m(&self) -> impl Iterator<Item = f64> {
-        (1..=self.lanes).map(|lane| self.widths.width_m(lane))
+    /// Returns the greatest width of a lane along the road (m).
+    pub fn greatest_lane_width_m(&self, lane: Lane) -> f64 {
+        match &self.widths {
+            LaneWidths::Along(along) => along.greatest_m(lane.0),
+            LaneWidths::Equal(_) | LaneWidths::Each(_) => self.lane_width_m(lane, 0.0),
+        }
+    }
+
+    /// Returns the widths of the lanes at a position along the road (m), from lane 1 on.
+    pub fn lane_widths_m(&self, s_m: f64) -> impl Iterator<Item = f64> {
+        (1..=self.lanes).map(move |lane| self.widths.width_m(lane, s_m))
     }
 
     /// Returns the width of every lane (m), or `None` if the lanes have different widths.
     pub fn equal_lane_width_m(&self) -> Option<f64> {
         match self.widths {
             LaneWidths::Equal(width_m) => Some(width_m),
-            LaneWidths::Each(_) => None,
+            LaneWidths::Each(_) | LaneWidths::Along(_) => None,
         }
     }
 
-    /// Returns the widths of the narrowest and of the widest lane (m).
-    pub fn lane_width_range_m(&self) -> [f64; 2] {
-        let range = |[low_m, high_m]: [f64; 2], width_m: f64| [low_m.min(width_m), high_m.max(width_m)];
-        self.lane_widths_m().fold([f64::INFINITY, f64::NEG_INFINITY], range)
+    /// Returns the positions between which the widths of the lanes change linearly (m), in their
+    /// order. There is none if each lane has one width.
+    pub fn cross_sections_m(&self) -> impl Iterator<Item = f64> {
+        let along = match &self.widths {
+            LaneWidths::Along(along) => Some(along),
+            LaneWidths::Equal(_) | LaneWidths::Each(_) => None,
+        };
+        along.into_iter().flat_map(CrossSections::positions_m)
     }
 
-    /// Returns the lateral position of a boundary of the lanes (m). Boundary 0 is the left edge of lane
-    /// 1, and boundary n is the right edge of lane n.
-    pub fn boundary_m(&self, number: u8) -> f64 {
-        self.widths.boundary_m(number)
+    /// Returns true if the widths of the lanes change along the road.
+    pub fn has_changing_lanes(&self) -> bool {
+        matches!(self.widths, LaneWidths::Along(_))
+    }
+
+    /// Returns the widths of the narrowest and of the widest lane (m), where it is wide enough for
+    /// vehicles.
+    pub fn lane_width_range_m(&self) -> [f64; 2] {
+        self.widths.range_m(self.lanes)
+    }
+
+    /// Returns the lateral position of a boundary of the lanes at a position along the road (m), with
+    /// the full width of an acceleration lane. Boundary 0 is the left edge of lane 1, and boundary n
+    /// is the right edge of lane n.
+    pub fn full_boundary_m(&self, number: u8, s_m: f64) -> f64 {
+        self.widths.boundary_m(number, s_m)
     }
 
     /// Returns true if the road is straight everywhere, as a road without curvature and without an
@@ -506,12 +561,12 @@ impl Road {
         })
     }
 
-    /// Returns the lateral position of a [boundary](Self::boundary_m) of the lanes at `s_m` (m). The
-    /// outer boundary of the acceleration lane moves inwards where the lane narrows.
+    /// Returns the lateral position of a [boundary](Self::full_boundary_m) of the lanes at `s_m` (m).
+    /// The outer boundary of the acceleration lane moves inwards where the lane narrows.
     pub fn boundary_at_m(&self, number: u8, s_m: f64) -> f64 {
-        let full_m = self.boundary_m(number);
+        let full_m = self.full_boundary_m(number, s_m);
         let (Some(lane), Some(entry)) = (self.acceleration_lane, self.entry_lane()) else { return full_m };
-        let missing_m = || (1.0 - lane.width_share(s_m)) * self.lane_width_m(entry);
+        let missing_m = || (1.0 - lane.width_share(s_m)) * self.lane_width_m(entry, s_m);
         match self.overtaking_side {
             Side::Left if number == self.lanes => full_m + missing_m(),
             Side::Right if number == 0 => full_m - missing_m(),
@@ -519,27 +574,65 @@ impl Road {
         }
     }
 
+    /// Divides a part of the road into stretches (m), so that on each stretch the boundaries of the
+    /// lanes move linearly or not at all. Returns the starts and ends.
+    pub fn stretches_m(&self, [from_m, to_m]: [f64; 2]) -> Vec<[f64; 2]> {
+        let taper_m = self.acceleration_lane.map(|lane| [lane.to_m, lane.taper_end_m]).into_iter().flatten();
+        let ends_m = taper_m.chain(self.cross_sections_m());
+        let mut starts_m = vec![from_m];
+        starts_m.extend(ends_m.filter(|end_m| from_m < *end_m && *end_m < to_m));
+        starts_m.sort_by(f64::total_cmp);
+        starts_m.dedup();
+        let ends_m = starts_m.iter().skip(1).copied().chain([to_m]);
+        starts_m.iter().copied().zip(ends_m).map(|(start_m, end_m)| [start_m, end_m]).collect()
+    }
+
     /// Returns the same road with guard rails on both sides.
     #[must_use]
-    pub const fn with_guard_rails(self) -> Self {
-        Self { guard_rails: true, ..self }
+    pub fn with_guard_rails(&self) -> Self {
+        Self { guard_rails: true, ..self.clone() }
     }
 
     /// Returns the same road without guard rails.
     #[must_use]
-    pub const fn without_guard_rails(self) -> Self {
-        Self { guard_rails: false, ..self }
+    pub fn without_guard_rails(&self) -> Self {
+        Self { guard_rails: false, ..self.clone() }
     }
 
-    /// Returns the lateral position of the centre of a lane (m), which is negative.
-    pub fn lane_centre_m(&self, lane: Lane) -> f64 {
-        self.widths.centre_m(lane.0)
+    /// Returns the lateral position of the centre of a lane at a position along the road (m), which
+    /// is negative.
+    pub fn lane_centre_m(&self, lane: Lane, s_m: f64) -> f64 {
+        self.widths.centre_m(lane.0, s_m)
     }
 
-    /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that
-    /// edge.
-    pub fn lane_at(&self, d_m: f64) -> Lane {
-        Lane(self.widths.lane_at(self.lanes, d_m))
+    /// Returns the lateral position of the line that a driver in a lane follows (m), and its first
+    /// (m/m) and second derivative (1/m) with respect to s: the centre of the lane, without the kinks
+    /// of lanes whose widths change. Where the lane is narrower than 2.5 m, the line leads to the lane
+    /// beside it.
+    pub fn driving_line(&self, lane: Lane, s_m: f64) -> [f64; 3] {
+        match &self.widths {
+            LaneWidths::Along(along) => along.driving_line(self.lanes, lane.0, s_m),
+            LaneWidths::Equal(_) | LaneWidths::Each(_) => [self.lane_centre_m(lane, s_m), 0.0, 0.0],
+        }
+    }
+
+    /// Returns the lane that a driver in a lane is in if it follows its [driving
+    /// line](Self::driving_line): the lane beside it where the lane has no width any more, or not yet.
+    pub fn followed_lane(&self, lane: Lane, s_m: f64) -> Lane {
+        match &self.widths {
+            LaneWidths::Along(along) => Lane(along.followed(self.lanes, lane.0, s_m)),
+            LaneWidths::Equal(_) | LaneWidths::Each(_) => lane,
+        }
+    }
+
+    /// Returns the lane in which the point (`s_m`, `d_m`) lies; beyond an edge, the lane at that edge.
+    pub fn lane_at(&self, s_m: f64, d_m: f64) -> Lane {
+        Lane(self.widths.lane_at(self.lanes, s_m, d_m))
+    }
+
+    /// Returns the lane in which a vehicle is; beyond an edge, the lane at that edge.
+    pub fn lane_of(&self, vehicle: &VehicleState) -> Lane {
+        self.lane_at(vehicle.s_m, vehicle.d_m)
     }
 
     /// Returns the lane next to `lane` on one side, or `None` if the road has none there.
@@ -562,9 +655,18 @@ impl Road {
         }
     }
 
-    /// Returns the lateral position of the right edge of the road (m), which is negative.
+    /// Returns true if a lane has room for vehicles between two positions (m), of which the first one
+    /// is the smaller one: 2.5 m or more. The lanes of a road have it unless their widths change.
+    pub fn is_open(&self, lane: Lane, [from_m, to_m]: [f64; 2]) -> bool {
+        let LaneWidths::Along(along) = &self.widths else { return true };
+        let is_wide = |s_m: f64| along.width_m(lane.0, s_m) >= Self::LANE_WIDTH_M.low();
+        is_wide(from_m) && is_wide(to_m) && along.positions_between_m([from_m, to_m]).all(is_wide)
+    }
+
+    /// Returns the lateral position of the right edge of the road (m), which is negative: the
+    /// rightmost place of the right edge of the lanes.
     pub fn right_edge_m(&self) -> f64 {
-        self.boundary_m(self.lanes)
+        self.widths.right_edge_m(self.lanes)
     }
 
     /// Returns the pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the
@@ -629,11 +731,11 @@ mod tests {
     #[test]
     fn lanes_are_counted_from_the_left() {
         let road = Road::straight(3);
-        assert_eq!(road.lane_at(-0.1), Lane(1));
-        assert_eq!(road.lane_at(-3.76), Lane(2));
-        assert_eq!(road.lane_at(-99.0), Lane(3));
-        assert_eq!(road.lane_at(1.0), Lane(1));
-        assert_eq!(road.lane_centre_m(Lane(2)), -5.625);
+        assert_eq!(road.lane_at(0.0, -0.1), Lane(1));
+        assert_eq!(road.lane_at(0.0, -3.76), Lane(2));
+        assert_eq!(road.lane_at(0.0, -99.0), Lane(3));
+        assert_eq!(road.lane_at(0.0, 1.0), Lane(1));
+        assert_eq!(road.lane_centre_m(Lane(2), 0.0), -5.625);
         assert_eq!(road.beside(Lane(1), Side::Left), None);
         assert_eq!(road.beside(Lane(2), Side::Left), Some(Lane(1)));
         assert_eq!(road.beside(Lane(3), Side::Right), None);
@@ -679,12 +781,25 @@ mod tests {
     }
 
     #[test]
+    fn the_stretches_of_a_part_end_where_a_width_begins_or_ends_to_change() {
+        let road = Road::straight(3).with_acceleration_lane(ENTRY);
+        assert_eq!(road.stretches_m([0.0, 500.0]), [[0.0, 350.0], [350.0, 410.0], [410.0, 500.0]]);
+        assert_eq!(road.stretches_m([360.0, 400.0]), [[360.0, 400.0]]);
+        assert_eq!(road.stretches_m([500.0, 600.0]), [[500.0, 600.0]]);
+        assert_eq!(Road::straight(3).stretches_m([0.0, 500.0]), [[0.0, 500.0]]);
+        let section = |s_m, width_m| (s_m, 0.0, vec![3.5, width_m, 3.5]);
+        let road = road.with_cross_sections(&[section(350.0, 3.5), section(380.0, 3.25)]);
+        assert_eq!(road.stretches_m([0.0, 400.0]), [[0.0, 350.0], [350.0, 380.0], [380.0, 400.0]]);
+    }
+
+    #[test]
     fn a_wrong_acceleration_lane_is_refused_by_its_key() {
         let check = |lanes, length_m: f64| {
             let config = RoadConfig {
                 lanes,
                 lane_width_m: default_lane_width(),
                 curvature_per_m: default_curvature(),
+                cross_sections: Vec::new(),
                 alignment: Vec::new(),
                 alignment_d_m: None,
                 speed_limit_mps: default_speed_limit(),
@@ -716,6 +831,7 @@ mod tests {
                 lanes: 3,
                 lane_width_m: default_lane_width(),
                 curvature_per_m: curvature_per_m.into(),
+                cross_sections: Vec::new(),
                 alignment: points.iter().map(point).collect(),
                 alignment_d_m: d_m.map(Num::Fixed),
                 speed_limit_mps: default_speed_limit(),

@@ -74,6 +74,7 @@ fn road(guard_rails: bool) -> Road {
         lanes: 3,
         lane_width_m: 3.75.into(),
         curvature_per_m: 0.0.into(),
+        cross_sections: Vec::new(),
         alignment: Vec::new(),
         alignment_d_m: None,
         speed_limit_mps: 36.1.into(),

@@ -135,7 +135,7 @@ impl<D: Driver> MergingDriver<D> {
             action.acceleration_mps2 = action.acceleration_mps2.min(RAMP_GAIN_PER_S * (ramp_mps - speed_mps));
         } else {
             action.indicator = Indicator::towards(side);
-            let target = input.road.beside(input.road.lane_at(input.own.d_m), side);
+            let target = input.road.beside(input.road.lane_of(input.own), side);
             if let (Some(target), Some(through)) = (target, scene.adjacent(side))
                 && self.accepts(through, speed_mps, rest_m)
             {
@@ -180,7 +180,7 @@ impl<D: Driver> MergingDriver<D> {
             Side::Right => neighbours.right,
         };
         // A vehicle ahead in the acceleration lane matters as long as it is in the path.
-        if input.road.entry_lane() == Some(input.road.lane_at(input.own.d_m)) {
+        if input.road.entry_lane() == Some(input.road.lane_of(input.own)) {
             neighbours.own.lead = through.and_then(|lane| lane.lead);
         }
         let action = self.driver.step(&DriverInput { neighbours: &neighbours, ..*input }, rng)?;
@@ -274,7 +274,7 @@ mod tests {
         };
         let mut driver = human().build_merging();
         let mut rng = stream(0, 0, &ActorId::new("ramp").unwrap(), "driver");
-        let d_m = road.lane_centre_m(road.entry_lane().unwrap());
+        let d_m = road.lane_centre_m(road.entry_lane().unwrap(), 0.0);
         let mut own = VehicleState { s_m: 50.0, d_m, speed_mps, ..VehicleState::default() };
         for step in 0..6_000 {
             let input = DriverInput {

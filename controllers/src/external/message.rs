@@ -12,9 +12,9 @@ use crate::{EgoInput, Front, Odometry, SensorAvailability};
 pub struct RoadMessage {
     /// Number of lanes.
     pub lanes: u8,
-    /// Width of the ego's lane (m).
+    /// Width of the ego's lane (m); if it changes along the road, the greatest one.
     pub lane_width_m: f64,
-    /// Width of each lane (m), from lane 1 on.
+    /// Width of each lane (m), from lane 1 on; if it changes along the road, the greatest one.
     pub lane_widths_m: Vec<f64>,
     /// Curvature (1/m), positive to the left; `None` if it changes along the road.
     pub curvature_per_m: Option<f64>,
@@ -29,8 +29,8 @@ impl RoadMessage {
     pub fn of(road: &Road, lane: traffic::Lane) -> Self {
         Self {
             lanes: road.lanes(),
-            lane_width_m: road.lane_width_m(lane),
-            lane_widths_m: road.lane_widths_m().collect(),
+            lane_width_m: road.greatest_lane_width_m(lane),
+            lane_widths_m: (1..=road.lanes()).map(|lane| road.greatest_lane_width_m(traffic::Lane(lane))).collect(),
             curvature_per_m: road.constant_curvature_per_m(),
             speed_limit_mps: road.speed_limit_mps(),
             overtaking_side: road.overtaking_side(),

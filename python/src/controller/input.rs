@@ -202,7 +202,7 @@ impl ControllerInput {
             },
             front,
             sensors: input.sensors,
-            road: *input.road,
+            road: input.road.clone(),
             curvature_per_m: input.curvature_per_m,
             measured: *own,
             tracks: input.tracks.to_vec(),

@@ -281,7 +281,7 @@ impl Poses {
         let of_road = |axis: usize| move |index: usize| self.poses[index].on_road.unwrap_or_default()[axis];
         if self.poses[before].on_road.is_some() && self.poses[after].on_road.is_some() {
             let [s_m, d_m, heading_rad] = [0, 1, 2].map(|axis| mixed(&of_road(axis)));
-            return Ok((*road, VehicleState { s_m, d_m, heading_rad, ..state }));
+            return Ok((road.clone(), VehicleState { s_m, d_m, heading_rad, ..state }));
         }
         let path_per_m = self.curvature_per_m(before);
         // The curvature of a road is the curvature of its left edge, where d is 0.

@@ -142,8 +142,8 @@ impl Writer<'_> {
                     Some(StartConfig::Absolute(start)) => self.values.expression(&start.s_m),
                     _ => actor.start.s_m.into(),
                 };
-                let lane = self.scenario.road.lane_at(actor.start.d_m);
-                let offset_m = actor.start.d_m - self.scenario.road.lane_centre_m(lane);
+                let lane = self.scenario.road.lane_of(&actor.start);
+                let offset_m = actor.start.d_m - self.scenario.road.lane_centre_m(lane, actor.start.s_m);
                 Element::new("LanePosition")
                     .with("roadId", 1)
                     .with("laneId", format!("-{lane}"))
@@ -155,7 +155,7 @@ impl Writer<'_> {
 
     fn relative_position(&self, index: usize, start: &RelativeStartConfig, sign: f64) -> Element {
         let Some(reference) = self.index_of(&start.of) else { return Element::new("LanePosition") };
-        let lanes = [index, reference].map(|actor| self.scenario.road.lane_at(self.scenario.actors[actor].start.d_m));
+        let lanes = [index, reference].map(|actor| self.start_lane(actor));
         let (front, back) = if sign > 0.0 { (index, reference) } else { (reference, index) };
         // From rear axle to rear axle: the gap, the distance from the rear vehicle's axle to its
         // front, and the distance from the lead vehicle's rear to its axle.
@@ -209,9 +209,9 @@ impl Writer<'_> {
     fn vehicle_ahead(&self, index: usize) -> Option<usize> {
         let actors = &self.scenario.actors;
         let (start, road) = (&actors[index].start, &self.scenario.road);
-        let lane = road.lane_at(start.d_m);
+        let lane = road.lane_of(start);
         (0..actors.len())
-            .filter(|other| road.lane_at(actors[*other].start.d_m) == lane && actors[*other].start.s_m > start.s_m)
+            .filter(|other| road.lane_of(&actors[*other].start) == lane && actors[*other].start.s_m > start.s_m)
             .min_by(|a, b| actors[*a].start.s_m.total_cmp(&actors[*b].start.s_m))
     }
 
@@ -220,7 +220,7 @@ impl Writer<'_> {
     }
 
     fn start_lane(&self, index: usize) -> Lane {
-        self.scenario.road.lane_at(self.scenario.actors[index].start.d_m)
+        self.scenario.road.lane_of(&self.scenario.actors[index].start)
     }
 
     /// Returns the events of a vehicle.
@@ -515,7 +515,7 @@ impl Writer<'_> {
 fn enters(scenario: &Scenario, index: usize) -> bool {
     let actor = &scenario.actors[index];
     let merges = matches!(&actor.driver, CheckedDriver::Human(human) if !matches!(human, HumanDriver::Prescribed(_)));
-    merges && scenario.road.entry_lane() == Some(scenario.road.lane_at(actor.start.d_m))
+    merges && scenario.road.entry_lane() == Some(scenario.road.lane_of(&actor.start))
 }
 
 /// Returns the name of the event in which a vehicle first changes lanes.

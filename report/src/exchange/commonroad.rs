@@ -64,18 +64,32 @@ fn point(x_m: f64, y_m: f64) -> Element {
     Element::new("point").child(text("x", x_m)).child(text("y", y_m))
 }
 
-/// Returns a lane, or `None` if the acceleration lane ends before the part of the road that is
-/// used. Lanelets beside each other have the same ends: the acceleration lane is beside none.
-fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Option<Element> {
-    let [start_m, mut end_m] = road.range_m();
-    let entry = scenario.road.entry_lane();
-    if let Some(acceleration_lane) = scenario.road.acceleration_lane().filter(|_| entry == Some(lane)) {
+/// Returns the positions between which a lane has a width (m).
+fn ends_m(scenario: &Scenario, lane: Lane, range_m: [f64; 2]) -> [f64; 2] {
+    let road = &scenario.road;
+    let has_width = |[from_m, to_m]: &&[f64; 2]| road.lane_width_m(lane, 0.5 * (from_m + to_m)) > 0.0;
+    let stretches_m = road.stretches_m(range_m);
+    let mut with_width = stretches_m.iter().filter(has_width);
+    let (first, last) = (with_width.next(), with_width.next_back());
+    let start_m = first.map_or(range_m[1], |first| first[0]);
+    let mut end_m = last.or(first).map_or(range_m[1], |last| last[1]);
+    if let Some(acceleration_lane) = road.acceleration_lane().filter(|_| road.entry_lane() == Some(lane)) {
         end_m = end_m.min(acceleration_lane.taper_end_m);
     }
+    [start_m, end_m]
+}
+
+/// Returns a lane, or `None` if it has no width on the part of the road that is used. Lanelets beside
+/// each other have the same ends: a lane that begins or ends, as the acceleration lane does, is beside
+/// none.
+fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Option<Element> {
+    let lane_ends_m = |lane| ends_m(scenario, lane, road.range_m());
+    let [start_m, end_m] = lane_ends_m(lane);
     if !(start_m < end_m) {
         return None;
     }
     let count = ((end_m - start_m) / POINT_SPACING_M).ceil().max(1.0);
+    let entry = scenario.road.entry_lane();
     let bound = |name, number: u8| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a road has some thousand points")]
         let points = (0..=count as u32).map(|index| {
@@ -87,7 +101,9 @@ fn lanelet(scenario: &Scenario, lane: Lane, road: UsedRoad<'_>) -> Option<Elemen
         Element::new(name).children(points).child(text("lineMarking", if is_edge { "solid" } else { "dashed" }))
     };
     let beside = |name, side| {
-        let other = scenario.road.beside(lane, side).filter(|other| entry != Some(lane) && entry != Some(*other));
+        let ends_differ =
+            |other: &Lane| lane_ends_m(*other) != [start_m, end_m] || [lane, *other].map(Some).contains(&entry);
+        let other = scenario.road.beside(lane, side).filter(|other| !ends_differ(other));
         other.map(|other| Element::new(name).with("ref", other).with("drivingDir", "same"))
     };
     let lanelet = Element::new("lanelet")

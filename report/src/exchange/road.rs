@@ -6,7 +6,8 @@
 //! ```
 //!
 //! If the alignment lies beside the left edge, it is the reference line, and the lanes have an
-//! offset.
+//! offset. Lanes whose widths change have a polynomial of first degree for each stretch, and so has
+//! the offset.
 //!
 //! An acceleration lane is lane −n, in three lane sections: with the full width, with a width that
 //! falls to 0, and without the lane. Before the lane begins, the marking to its left is solid. If
@@ -64,12 +65,7 @@ impl<'a> UsedRoad<'a> {
     fn element(&self, name: &str) -> Element {
         let speed = Element::new("speed").with("max", self.road.speed_limit_mps()).with("unit", "m/s");
         let sections = self.sections();
-        let beside_m = self.road.alignment_d_m();
-        let offset = || {
-            let offset = Element::new("laneOffset").with("s", 0).with("a", -beside_m);
-            offset.with("b", 0).with("c", 0).with("d", 0)
-        };
-        let mut lanes = Element::new("lanes").children((beside_m != 0.0).then(offset));
+        let mut lanes = Element::new("lanes").children(self.offsets());
         for (number, section) in sections.iter().enumerate() {
             let before = number.checked_sub(1).map(|number| &sections[number]);
             lanes = lanes.child(self.section(section, [before, sections.get(number + 1)]));
@@ -123,16 +119,19 @@ impl<'a> UsedRoad<'a> {
     fn sections(&self) -> Vec<Section> {
         let lanes = self.road.lanes();
         let Some(lane) = self.narrowing_lane() else {
-            return vec![Section { from_m: 0.0, lanes, is_taper: false }];
+            return vec![Section { from_m: 0.0, to_m: self.length_m, lanes, is_taper: false }];
         };
         let [narrows_m, ends_m] = [lane.to_m, lane.taper_end_m].map(|s_m| s_m - self.start_m);
-        let stretches = [
-            (Section { from_m: 0.0, lanes, is_taper: false }, narrows_m),
-            (Section { from_m: narrows_m.max(0.0), lanes, is_taper: true }, ends_m),
-            (Section { from_m: ends_m.max(0.0), lanes: lanes - 1, is_taper: false }, self.length_m),
+        let section = |from_m: f64, to_m: f64, lanes, is_taper| {
+            let (from_m, to_m) = (from_m.max(0.0), to_m.min(self.length_m));
+            (from_m < to_m).then_some(Section { from_m, to_m, lanes, is_taper })
+        };
+        let sections = [
+            section(0.0, narrows_m, lanes, false),
+            section(narrows_m, ends_m, lanes, true),
+            section(ends_m, self.length_m, lanes - 1, false),
         ];
-        let is_on_road = |(section, to_m): &(Section, f64)| section.from_m < to_m.min(self.length_m);
-        stretches.into_iter().filter(is_on_road).map(|(section, _)| section).collect()
+        sections.into_iter().flatten().collect()
     }
 
     /// Returns a lane section. `beside` holds the sections before and behind it.
@@ -141,7 +140,14 @@ impl<'a> UsedRoad<'a> {
             Element::new("lane").with("id", 0).with("type", "none").with("level", "false").child(marking("solid", 0.0));
         let right = (1..=section.lanes).map(|lane| {
             let ends = [("predecessor", beside[0]), ("successor", beside[1])];
-            let links = ends.into_iter().filter(|(_, other)| other.is_some_and(|other| lane <= other.lanes));
+            // A lane without a width at an end has no lane beyond it.
+            let has_width = |name: &str| {
+                let along_m = if name == "predecessor" { section.from_m } else { section.to_m };
+                self.road.lane_width_m(Lane(lane), self.start_m + along_m) > 0.0
+            };
+            let links = ends
+                .into_iter()
+                .filter(|(name, other)| other.is_some_and(|other| lane <= other.lanes) && has_width(name));
             let links: Vec<Element> =
                 links.map(|(name, _)| Element::new(name).with("id", format!("-{lane}"))).collect();
             let link = (!links.is_empty()).then(|| Element::new("link").children(links));
@@ -150,7 +156,7 @@ impl<'a> UsedRoad<'a> {
                 .with("type", "driving")
                 .with("level", "false")
                 .children(link)
-                .child(self.width(section, Lane(lane)))
+                .children(self.widths(section, Lane(lane)))
                 .children(self.markings(section, Lane(lane)))
         });
         // The standard lists the lanes of a section with descending numbers: from left to right.
@@ -160,16 +166,61 @@ impl<'a> UsedRoad<'a> {
             .child(Element::new("right").children(right))
     }
 
-    fn width(&self, section: &Section, lane: Lane) -> Element {
-        let full_m = self.road.lane_width_m(lane);
-        let width = Element::new("width").with("sOffset", 0);
-        let width = match self.narrowing_lane().filter(|_| section.is_taper && lane.0 == section.lanes) {
-            Some(narrowing) => width
-                .with("a", full_m * narrowing.width_share(self.start_m + section.from_m))
-                .with("b", -full_m / (narrowing.taper_end_m - narrowing.to_m)),
-            None => width.with("a", full_m).with("b", 0),
+    /// Returns the widths of a lane in a section: a polynomial for each stretch.
+    fn widths(&self, section: &Section, lane: Lane) -> Vec<Element> {
+        let section_m = self.start_m + section.from_m;
+        let narrowing = self.narrowing_lane().filter(|_| section.is_taper && lane.0 == section.lanes);
+        let width = |[from_m, to_m]: [f64; 2]| {
+            let [full_m, end_m] = [from_m, to_m].map(|s_m| self.road.lane_width_m(lane, s_m));
+            let width = Element::new("width").with("sOffset", from_m - section_m);
+            let slope = (end_m - full_m) / (to_m - from_m);
+            // The product of the share and the width is a polynomial of second degree.
+            let [a, b, c] = match narrowing {
+                Some(narrowing) => {
+                    let (share, falls) =
+                        (narrowing.width_share(from_m), 1.0 / (narrowing.taper_end_m - narrowing.to_m));
+                    match slope == 0.0 {
+                        true => [full_m * share, -full_m / (narrowing.taper_end_m - narrowing.to_m), 0.0],
+                        false => [full_m * share, slope * share - full_m * falls, -slope * falls],
+                    }
+                }
+                None => [full_m, slope, 0.0],
+            };
+            width.with("a", a).with("b", b).with("c", c).with("d", 0)
         };
-        width.with("c", 0).with("d", 0)
+        self.stretches_m(section).into_iter().map(width).collect()
+    }
+
+    /// Returns the stretches of a section on which each boundary of the lanes is a line (m).
+    fn stretches_m(&self, section: &Section) -> Vec<[f64; 2]> {
+        let ends_m = [section.from_m, section.to_m].map(|along_m| self.start_m + along_m);
+        match self.road.has_changing_lanes() {
+            true => self.road.stretches_m(ends_m),
+            false => vec![ends_m],
+        }
+    }
+
+    /// Returns the distance of the left edge of the lanes from the reference line, if it is not
+    /// always 0.
+    fn offsets(&self) -> Vec<Element> {
+        let beside_m = self.road.alignment_d_m();
+        let offset = |from_m: f64, offset_m: f64, slope: f64| {
+            let offset = Element::new("laneOffset").with("s", from_m - self.start_m).with("a", offset_m);
+            offset.with("b", slope).with("c", 0).with("d", 0)
+        };
+        if !self.road.has_changing_lanes() {
+            return (beside_m != 0.0).then(|| offset(self.start_m, -beside_m, 0.0)).into_iter().collect();
+        }
+        let of_stretch = |[from_m, to_m]: [f64; 2]| {
+            let [left_m, end_m] = [from_m, to_m].map(|s_m| self.road.full_boundary_m(0, s_m));
+            (from_m, left_m - beside_m, (end_m - left_m) / (to_m - from_m))
+        };
+        let mut offsets: Vec<(f64, f64, f64)> =
+            self.road.stretches_m(self.range_m()).into_iter().map(of_stretch).collect();
+        offsets.dedup_by(|next, before| next.2 == 0.0 && before.2 == 0.0 && next.1 == before.1);
+        let is_zero = offsets.iter().all(|(_, offset_m, slope)| *offset_m == 0.0 && *slope == 0.0);
+        let offsets = offsets.into_iter().filter(|_| !is_zero);
+        offsets.map(|(from_m, offset_m, slope)| offset(from_m, offset_m, slope)).collect()
     }
 
     /// Returns the markings to the right of a lane.
@@ -194,8 +245,9 @@ impl<'a> UsedRoad<'a> {
 /// A stretch of the road with the same lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Section {
-    /// Where it begins, from the start of the file's road (m).
+    /// Where it begins and ends, from the start of the file's road (m).
     from_m: f64,
+    to_m: f64,
     lanes: u8,
     /// Whether the rightmost lane narrows to nothing.
     is_taper: bool,

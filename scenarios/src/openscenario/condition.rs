@@ -206,7 +206,8 @@ impl Storyboard<'_> {
 
     /// Returns the distance between a vehicle and a place across the road (m).
     fn across_m(&self, vehicle: &Vehicle, place: &RoadPoint) -> f64 {
-        let centre_m = self.road.index(vehicle.lane).map_or(f64::NAN, |index| self.road.centres_m[index]);
+        let centre_m =
+            self.road.index(vehicle.lane).map_or(f64::NAN, |index| self.road.file_centre_m(index, vehicle.s_m));
         place.t_m - (centre_m + vehicle.offset_m)
     }
 

@@ -2,9 +2,9 @@
 //! curves of third degree are replaced by pieces whose curvature changes linearly.
 //!
 //! The curvature of a curve is sampled along its length. The samples that a linear interpolation
-//! reproduces are left out (Douglas and Peucker 1973), until at most [`Alignment::MAX_POINTS`]
-//! remain. The line that results is compared with the positions in the file: it may deviate by
-//! [`MOST_DEVIATION_M`].
+//! reproduces are left out (Douglas and Peucker 1973), until few points remain. The line that
+//! results is compared with the positions in the file: it may deviate by [`MOST_DEVIATION_M`]. If it
+//! deviates more, more points remain, up to [`Alignment::MAX_POINTS`].
 
 use std::path::Path;
 
@@ -23,6 +23,9 @@ const STEPS: u32 = 16;
 /// few enough points remain.
 const LEAST_TOLERANCE_PER_M: f64 = 1e-7;
 const TOLERANCE_FACTOR: f64 = 1.5;
+/// Number of points of an alignment that a reader of the scenario still takes in. A line that follows
+/// curves of third degree with as many has no more.
+const FEW_POINTS: usize = 64;
 
 /// A point of the reference line of the file.
 #[derive(Clone, Copy, Debug)]
@@ -119,26 +122,39 @@ pub(super) fn alignment(
         )));
     }
     let points = spaced(&samples);
-    let mut tolerance_per_m = LEAST_TOLERANCE_PER_M;
-    let mut kept = simplified(&points, tolerance_per_m);
-    while kept.len() > Alignment::MAX_POINTS {
-        tolerance_per_m *= TOLERANCE_FACTOR;
-        kept = simplified(&points, tolerance_per_m);
-    }
-    let line = match Alignment::new(&kept) {
-        Ok(line) => line,
-        Err(error) => return Ok(Err(format!("a course that is no alignment ({error})"))),
+    let with_tolerance = |steps: u32| {
+        simplified(
+            &points,
+            (0..steps).fold(LEAST_TOLERANCE_PER_M, |tolerance_per_m, _| tolerance_per_m * TOLERANCE_FACTOR),
+        )
     };
-    let Some(deviation_m) = deviation_m(path, plan, &samples, &line) else {
-        return Ok(Err("a course whose pieces do not say where they begin".to_owned()));
-    };
-    if !(deviation_m <= MOST_DEVIATION_M) {
-        return Ok(Err(format!(
-            "a course from which {} points of a curvature that changes linearly deviate by {deviation_m:.2} m, and \
-             {MOST_DEVIATION_M} m are allowed",
-            line.points().len()
-        )));
+    let few_points = if has_curves { FEW_POINTS } else { Alignment::MAX_POINTS };
+    let (mut steps, mut kept) = (0, with_tolerance(0));
+    while kept.len() > few_points {
+        steps += 1;
+        kept = with_tolerance(steps);
     }
+    let (line, deviation_m) = loop {
+        let line = match Alignment::new(&kept) {
+            Ok(line) => line,
+            Err(error) => return Ok(Err(format!("a course that is no alignment ({error})"))),
+        };
+        let Some(deviation_m) = deviation_m(path, plan, &samples, &line) else {
+            return Ok(Err("a course whose pieces do not say where they begin".to_owned()));
+        };
+        if deviation_m <= MOST_DEVIATION_M {
+            break (line, deviation_m);
+        }
+        let finer = steps.checked_sub(1).map(with_tolerance).filter(|finer| finer.len() <= Alignment::MAX_POINTS);
+        let Some(finer) = finer else {
+            return Ok(Err(format!(
+                "a course from which {} points of a curvature that changes linearly deviate by {deviation_m:.2} m, and \
+                 {MOST_DEVIATION_M} m are allowed",
+                line.points().len()
+            )));
+        };
+        (steps, kept) = (steps - 1, finer);
+    };
     if has_curves {
         notes.push(format!(
             "curves of third degree: pieces with a linear curvature follow them within {deviation_m:.3} m"
@@ -317,6 +333,34 @@ mod tests {
         let (line, notes) = read(&pieces(&Alignment::new(&expected).unwrap(), &SHAPES));
         assert_eq!(line.unwrap().points(), expected);
         assert!(notes.is_empty(), "{notes:?}");
+    }
+
+    #[test]
+    fn a_road_of_many_pieces_is_followed_exactly_and_one_of_many_curves_by_as_many_points_as_it_needs() {
+        let bends: Vec<[f64; 2]> =
+            (0..200).map(|index| [40.0 * f64::from(index), 0.002 * f64::from(index % 3)]).collect();
+        let expected = points(&bends);
+        let texts: Vec<String> = bends
+            .windows(2)
+            .map(|pair| format!("spiral curvStart=\"{}\" curvEnd=\"{}\"", pair[0][1], pair[1][1]))
+            .collect();
+        let shapes: Vec<(f64, &str)> = texts.iter().map(|text| (40.0, text.as_str())).collect();
+        let (line, notes) = read(&pieces(&Alignment::new(&expected).unwrap(), &shapes));
+        assert_eq!(line.unwrap().points(), expected);
+        assert!(notes.is_empty(), "{notes:?}");
+        // A hundred waves of third degree, 2 m to the left and back: 64 points are too few for them.
+        let slope = |x: f64, sign: f64| sign * 12.0 * (x - x * x / 100.0) / 10_000.0;
+        let length_m: f64 = (0..10_000).map(|step| 0.01 * maths::hypot(1.0, slope(0.01 * f64::from(step), 1.0))).sum();
+        let wave = |sign: f64| format!("poly3 a=\"0\" b=\"0\" c=\"{}\" d=\"{}\"", sign * 6e-4, sign * -4e-6);
+        let waves = [1.0, -1.0].map(wave);
+        let at = |index: u32| {
+            let is_back = index % 2;
+            (100.0 * f64::from(index), 2.0 * f64::from(is_back), 0.0, length_m, waves[is_back as usize].as_str())
+        };
+        let (line, notes) = read(&(0..100).map(at).collect::<Vec<_>>());
+        let count = line.unwrap().points().len();
+        assert!((101..=Alignment::MAX_POINTS).contains(&count), "{count}");
+        assert!(notes[0].contains("follow them within 0.0"), "{notes:?}");
     }
 
     #[test]

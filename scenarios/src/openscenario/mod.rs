@@ -11,6 +11,7 @@
 //! same for every controller. An element that a scenario cannot express is an error with file, line
 //! and element, or a note; nothing is left out in silence.
 
+mod changing_lanes;
 mod condition;
 mod course;
 mod distribution;
@@ -19,6 +20,7 @@ mod entities;
 mod entry_lane;
 mod follow;
 mod formula;
+mod numbering;
 mod offset;
 mod plane;
 mod reader;
@@ -562,7 +564,7 @@ fn scenario_text(
         }
         let speed_mps = speeds.first().map_or(start.speed_mps, |(_, mps)| *mps);
         let lane_index = road.index(start.lane).unwrap_or_default();
-        let (lane, centre_m) = (lane_index + 1, road.centre_m(lane_index));
+        let lane = lane_index + 1;
         let mass =
             start.mass_kg.filter(|mass| *mass > 0.0).map(|mass| format!(", mass-kg = {mass:?}")).unwrap_or_default();
         let _ = write!(
@@ -576,7 +578,7 @@ fn scenario_text(
             start.s_m + start.centre_m,
         );
         if index != played.ego
-            && let Some(path) = played.path(index, centre_m)?
+            && let Some(path) = played.path(index, lane_index)?
         {
             let points = path.iter().map(|point| {
                 let [travelled_m, d_m] = point.map(|value| (value * 1e6).round() / 1e6);
@@ -641,14 +643,17 @@ fn scenario_text(
             format!("alignment = [{}]{beside}", points.join(", "))
         }
     };
-    let width = match &road.widths_m[..] {
-        [first_m, others_m @ ..] if others_m.iter().all(|width_m| width_m == first_m) => format!("{first_m:?}"),
-        widths_m => format!("{widths_m:?}"),
+    let widths = match (&road.changing, &road.widths_m[..]) {
+        (Some(changing), _) => format!("cross-sections = {}", changing.text()),
+        (None, [first_m, others_m @ ..]) if others_m.iter().all(|width_m| width_m == first_m) => {
+            format!("lane-width-m = {first_m:?}")
+        }
+        (None, widths_m) => format!("lane-width-m = {widths_m:?}"),
     };
     let _ = write!(
         text,
         "schema-version = 1\nname = \"{}\"\ndescription = \"Imported from OpenSCENARIO\"\nduration-s = {duration_s:?}\n\
-         road = {{ lanes = {}, lane-width-m = {width}, {course}{}{}{} }}\n",
+         road = {{ lanes = {}, {widths}, {course}{}{}{} }}\n",
         kebab_name(&stem),
         road.lanes.len(),
         limit.map(|limit| format!(", speed-limit-mps = {limit:?}")).unwrap_or_default(),

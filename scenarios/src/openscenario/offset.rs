@@ -33,14 +33,14 @@ const LEAST_STEP_M: f64 = 0.5;
 /// same path.
 const SECOND_POINT_M: f64 = 10.0;
 impl Storyboard<'_> {
-    /// Returns half the width of a lane (m); 0 if the road does not have it.
-    fn half_width_m(&self, lane: i32) -> f64 {
-        self.road.index(lane).map_or(0.0, |index| self.road.half_width_m(index))
+    /// Returns half the width of a lane at a position (m); 0 if the road does not have it.
+    fn half_width_m(&self, lane: i32, s_m: f64) -> f64 {
+        self.road.index(lane).map_or(0.0, |index| self.road.half_width_m(index, s_m))
     }
 
     /// Checks that a place beside the centre of a lane (m) is within the lane.
-    fn check_offset(&self, node: &Node, lane: i32, offset_m: f64) -> Result<(), ImportError> {
-        let most_m = self.half_width_m(lane);
+    fn check_offset(&self, node: &Node, (lane, s_m): (i32, f64), offset_m: f64) -> Result<(), ImportError> {
+        let most_m = self.half_width_m(lane, s_m);
         match offset_m.abs() <= most_m {
             true => Ok(()),
             false => {
@@ -58,26 +58,30 @@ impl Storyboard<'_> {
     ///
     /// # Errors
     /// [`ImportError`] if it lies beside the driving lanes.
-    pub(super) fn lane_beside(&self, node: &Node, lane: i32, offset_m: f64) -> Result<(i32, f64), ImportError> {
-        if offset_m.abs() <= self.half_width_m(lane) {
+    pub(super) fn lane_beside(
+        &self,
+        node: &Node,
+        (lane, s_m): (i32, f64),
+        offset_m: f64,
+    ) -> Result<(i32, f64), ImportError> {
+        if offset_m.abs() <= self.half_width_m(lane, s_m) {
             return Ok((lane, offset_m));
         }
-        let centres_m = &self.road.centres_m;
-        let index = self.road.index(lane);
-        let Some(from_m) = index.and_then(|index| centres_m.get(index)).copied() else {
+        let Some(from_m) = self.road.index(lane).map(|index| self.road.file_centre_m(index, s_m)) else {
             return Err(self.reader.error(node, "the road has no lane"));
         };
         let place_m = from_m + offset_m;
-        if let Some(index) = self.road.lane_near(place_m)
-            && (place_m - centres_m[index]).abs() <= self.road.half_width_m(index)
-        {
-            return Ok((self.road.lanes[index], place_m - centres_m[index]));
+        if let Some(index) = self.road.lane_near(s_m, place_m) {
+            let beside_m = place_m - self.road.file_centre_m(index, s_m);
+            if beside_m.abs() <= self.road.half_width_m(index, s_m) {
+                return Ok((self.road.lanes[index], beside_m));
+            }
         }
-        let reach_m = |(low, high): (f64, f64), (index, centre_m): (usize, &f64)| {
-            let half_m = self.road.half_width_m(index);
+        let reach_m = |(low, high): (f64, f64), index: usize| {
+            let (centre_m, half_m) = (self.road.file_centre_m(index, s_m), self.road.half_width_m(index, s_m));
             (low.min(centre_m - half_m), high.max(centre_m + half_m))
         };
-        let (low_m, high_m) = centres_m.iter().enumerate().fold((f64::INFINITY, f64::NEG_INFINITY), reach_m);
+        let (low_m, high_m) = (0..self.road.lanes.len()).fold((f64::INFINITY, f64::NEG_INFINITY), reach_m);
         let message = format!(
             "`offset` leads {offset_m} m beside the centre of lane {lane}; the driving lanes reach from {:.2} to {:.2} m \
              beside it",
@@ -111,7 +115,7 @@ impl Storyboard<'_> {
             "RelativeTargetLaneOffset" => self.vehicle(target, "entityRef")?.offset_m + value_m,
             _ => return Err(reader.error(target, "this target is not read")),
         };
-        self.check_offset(target, self.vehicles[vehicle].lane, to_m)?;
+        self.check_offset(target, (self.vehicles[vehicle].lane, self.vehicles[vehicle].s_m), to_m)?;
         let dynamics = reader.child(node, &["LaneOffsetActionDynamics"])?;
         let is_cubic = reader.text(dynamics, "dynamicsShape")? == "cubic";
         let largest_mps2 = reader.number(dynamics, "maxLateralAcc")?;
@@ -128,19 +132,27 @@ impl Storyboard<'_> {
         Ok(Shift { vehicle, line: node.line, from_m, to_m, begins_s: self.time_s, duration_s, is_cubic, is_kept })
     }
 
-    /// Returns the lateral path of a vehicle that starts in a lane with its centre at `centre_m`,
-    /// or `None` if it keeps the centre of its lane.
+    /// Returns the lateral path of a vehicle that starts in the lane with an index, or `None` if it
+    /// keeps the centre of its lane.
     ///
     /// # Errors
     /// [`ImportError`] at the action by which a vehicle shifts that hardly moves.
-    pub(super) fn path(&self, vehicle: usize, centre_m: f64) -> Result<Option<Vec<[f64; 2]>>, ImportError> {
+    pub(super) fn path(&self, vehicle: usize, lane: usize) -> Result<Option<Vec<[f64; 2]>>, ImportError> {
         let changes = self.lane_changes.iter().filter(|change| change.vehicle == vehicle);
         let until_s = changes.map(|change| change.at_s).fold(f64::INFINITY, f64::min);
         let times = self.speeds[vehicle].iter().map(|(at_s, _)| *at_s).zip(&self.offsets[vehicle]);
         let before = times.take_while(|(at_s, _)| *at_s < until_s);
-        let samples: Vec<[f64; 2]> = before.step_by(STEPS_PER_POINT).map(|(_, sample)| *sample).collect();
+        let mut samples: Vec<[f64; 2]> = before.step_by(STEPS_PER_POINT).map(|(_, sample)| *sample).collect();
         if samples.iter().all(|[_, offset_m]| *offset_m == 0.0) {
             return Ok(None);
+        }
+        let start_m = self.vehicles[vehicle].s_m - self.vehicles[vehicle].travelled_m;
+        let centre_m = self.road.centre_m(lane, start_m);
+        if self.road.changing.is_some() {
+            // The path leads along the lane.
+            for [travelled_m, offset_m] in &mut samples {
+                *offset_m += self.road.centre_m(lane, start_m + *travelled_m) - centre_m;
+            }
         }
         let path = points(&samples, centre_m).map_err(|index| {
             #[expect(clippy::cast_precision_loss, reason = "some thousand points")]

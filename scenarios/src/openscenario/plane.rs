@@ -21,7 +21,7 @@ pub(super) struct RoadPoint {
 }
 
 /// A reference line.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct ReferenceLine {
     /// Position at which it begins, in the plane (m).
     pub(super) x_m: f64,
@@ -87,7 +87,8 @@ mod tests {
     fn a_road_of_more_than_half_a_turn_is_followed_from_point_to_point() {
         for curvature_per_m in [0.0025, -0.0025] {
             let course = Road::straight(1).with_curvature(curvature_per_m);
-            let line = ReferenceLine { x_m: 3.0, y_m: 4.0, heading_rad: 0.5, length_m: 2_900.0, course };
+            let line =
+                ReferenceLine { x_m: 3.0, y_m: 4.0, heading_rad: 0.5, length_m: 2_900.0, course: course.clone() };
             let at = |s_m: f64, before_m| {
                 let pose = course.plane_pose(s_m, -5.0, 0.0);
                 let (sin, cos) = maths::sin_cos(line.heading_rad);
@@ -113,7 +114,8 @@ mod tests {
         let straight = Road::straight(1);
         let bent = [0.0, 0.002, -0.002].map(|curvature_per_m| straight.with_curvature(curvature_per_m));
         for course in bent.into_iter().chain([straight.with_alignment(Alignment::new(&points).unwrap())]) {
-            let line = ReferenceLine { x_m: 100.0, y_m: -20.0, heading_rad: 0.7, length_m: 400.0, course };
+            let line =
+                ReferenceLine { x_m: 100.0, y_m: -20.0, heading_rad: 0.7, length_m: 400.0, course: course.clone() };
             let (s_m, t_m) = (250.0, -5.6);
             // The integral of the heading along the line.
             let steps = 100_000;

@@ -7,9 +7,11 @@ use std::path::Path;
 use closecall_traffic::words::counted;
 use closecall_traffic::{AccelerationLane, Alignment, Road};
 
+use super::changing_lanes::{self, ChangingLanes};
 use super::course;
 use super::dom::{ImportError, Node, number, parse};
 use super::entry_lane::{self, DRIVING};
+use super::numbering::Numbering;
 use super::plane::ReferenceLine;
 use super::reader::Reader;
 use super::sections::LaneSections;
@@ -26,6 +28,9 @@ const NO_LIMIT: [&str; 2] = ["no limit", "undefined"];
 /// Largest distance between two lanes that lie beside each other (m): the numbers of a file are
 /// rounded.
 const MOST_GAP_M: f64 = 0.01;
+/// Distance between lanes whose width changes and their lines from which on a note states it (m):
+/// numerical.
+const NOTED_DEVIATION_M: f64 = 1e-6;
 
 /// The part of a file's road that a scenario can use.
 #[derive(Clone, Debug)]
@@ -36,8 +41,10 @@ pub(super) struct ImportedRoad {
     pub(super) length_m: f64,
     /// The lanes of OpenDRIVE on which traffic drives along the reference line, from the left.
     pub(super) lanes: Vec<i32>,
-    /// The centres of these lanes, to the left of the reference line (m).
-    pub(super) centres_m: Vec<f64>,
+    /// The lanes of a road whose lanes change along it.
+    pub(super) changing: Option<ChangingLanes>,
+    /// The centres of the lanes of another road, to the left of the reference line (m).
+    centres_m: Vec<f64>,
     /// The widths of these lanes (m).
     pub(super) widths_m: Vec<f64>,
     pub(super) curvature_per_m: f64,
@@ -48,6 +55,8 @@ pub(super) struct ImportedRoad {
     pub(super) alignment_d_m: f64,
     /// Where along the road the lanes are.
     pub(super) sections: LaneSections,
+    /// The numbers of lanes that have another number in another lane section.
+    numbering: Option<Numbering>,
     pub(super) acceleration_lane: Option<AccelerationLane>,
     /// The reference line, or `None` if the road has another course than its reference line.
     pub(super) line: Option<ReferenceLine>,
@@ -62,21 +71,47 @@ impl ImportedRoad {
         self.lanes.iter().position(|other| *other == lane)
     }
 
-    /// Returns half the width of the lane with an index (m).
-    pub(super) fn half_width_m(&self, index: usize) -> f64 {
-        0.5 * self.widths_m.get(index).copied().unwrap_or_default()
+    /// Returns the number in the import of the lane that has a number in the file at `s_m`.
+    pub(super) fn number(&self, id: i32, s_m: f64) -> Option<i32> {
+        match &self.numbering {
+            Some(numbering) => numbering.number(self.sections.at(s_m), id),
+            None => Some(id),
+        }
     }
 
-    /// Returns the lateral position in the scenario of the centre of the lane with an index (m).
-    pub(super) fn centre_m(&self, index: usize) -> f64 {
-        -(self.widths_m.iter().take(index).sum::<f64>() + self.half_width_m(index))
+    /// Returns half the width at a position of the lane with an index (m).
+    pub(super) fn half_width_m(&self, index: usize, s_m: f64) -> f64 {
+        0.5 * match &self.changing {
+            Some(changing) => changing.width_m(index, s_m),
+            None => self.widths_m.get(index).copied().unwrap_or_default(),
+        }
     }
 
-    /// Returns the index of the lane in which a place to the left of the reference line (m) lies, or
-    /// to whose edge it is nearest.
-    pub(super) fn lane_near(&self, t_m: f64) -> Option<usize> {
-        let beyond_m = |index: usize| (self.centres_m[index] - t_m).abs() - self.half_width_m(index);
-        (0..self.centres_m.len()).min_by(|a, b| beyond_m(*a).total_cmp(&beyond_m(*b)))
+    /// Returns the centre at a position of the lane with an index, to the left of the reference line of
+    /// the file (m).
+    pub(super) fn file_centre_m(&self, index: usize, s_m: f64) -> f64 {
+        match &self.changing {
+            Some(changing) => changing.centre_m(index, s_m),
+            None => self.centres_m.get(index).copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Returns the lateral position in the scenario of the centre at a position of the lane with an
+    /// index (m).
+    pub(super) fn centre_m(&self, index: usize, s_m: f64) -> f64 {
+        match &self.changing {
+            Some(changing) => changing.centre_m(index, s_m) + self.alignment_d_m,
+            None => -(self.widths_m.iter().take(index).sum::<f64>() + self.half_width_m(index, s_m)),
+        }
+    }
+
+    /// Returns the index of the lane in which a place (m) lies, or to whose edge it is nearest: at
+    /// `s_m`, to the left of the reference line.
+    pub(super) fn lane_near(&self, s_m: f64, t_m: f64) -> Option<usize> {
+        let beyond_m = |index: usize| (self.file_centre_m(index, s_m) - t_m).abs() - self.half_width_m(index, s_m);
+        // A lane that has no width has no place.
+        let has_width = |index: &usize| self.changing.is_none() || self.half_width_m(*index, s_m) > 0.0;
+        (0..self.lanes.len()).filter(has_width).min_by(|a, b| beyond_m(*a).total_cmp(&beyond_m(*b)))
     }
 }
 
@@ -219,6 +254,12 @@ fn used_lane(
     })
 }
 
+/// Returns the numbers of lanes that have another number in another lane section.
+fn numbering(lanes: &Node, side: &str) -> Option<Numbering> {
+    let sections: Option<Vec<_>> = lanes.all("laneSection").map(|node| entry_lane::section(node, side)).collect();
+    Numbering::read(&sections?)
+}
+
 /// Reads the road that a scenario uses.
 ///
 /// # Errors
@@ -242,7 +283,7 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
     };
     let side = if is_left_hand { "left" } else { "right" };
     let entry = entry_lane::find(lanes, side, length_m);
-    let sections = LaneSections::read(path, lanes, side);
+    let mut sections = LaneSections::read(path, lanes, side);
     // The place that gives the lanes: the start of a vehicle, or of a road with an acceleration
     // lane.
     let (section, s_m) = match (used, &entry) {
@@ -253,8 +294,27 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         _ => (first, 0.0),
     };
     let place = Place { s_m, within_section_m: (s_m - start_m(section)).max(0.0) };
-    if sections.differ() && entry.is_none() {
-        notes.push(format!("lanes that begin or end: the lane section at {s_m} m gives the lanes"));
+    let numbering = numbering(lanes, side).filter(|_| entry.is_none());
+    let changing = changing_lanes::read(lanes, is_left_hand, length_m, (entry.as_ref(), numbering.as_ref()));
+    let (changing, why_not) = match changing {
+        Ok(changing) => (changing, String::new()),
+        Err(reason) => (None, format!(" ({reason})")),
+    };
+    let numbering = numbering.filter(|_| changing.is_some());
+    if let Some(numbering) = &numbering {
+        sections.renumber(numbering);
+        notes.push(
+            "lanes that get another number: notes and messages number the lanes of all sections together".to_owned(),
+        );
+    }
+    if let Some(changing) = &changing {
+        let deviation_m = changing.deviation_m;
+        if deviation_m > NOTED_DEVIATION_M {
+            notes.push(format!("lanes whose width or place changes: lines follow them within {deviation_m:.3} m"));
+        }
+    }
+    if sections.differ() && entry.is_none() && changing.is_none() {
+        notes.push(format!("lanes that begin or end{why_not}: the lane section at {s_m} m gives the lanes"));
     }
     let along = section.child(side).ok_or_else(|| section.error(path, format!("it has no lanes on the {side}")))?;
     let mut driving = driving_lanes(path, along, place, used)?;
@@ -275,12 +335,17 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
         return Err(border.error(path, "the width of a lane is read from `width`, and it has none"));
     }
     let entry_id = entry.map(|entry| entry.id);
-    if widths_change(lanes.all("laneSection").filter_map(|section| section.child(side)), &driving, entry_id) {
-        notes.push(format!("lanes whose width changes: each has the width at {s_m} m"));
+    let is_kept = changing.is_some();
+    if !is_kept && widths_change(lanes.all("laneSection").filter_map(|section| section.child(side)), &driving, entry_id)
+    {
+        notes.push(format!("lanes whose width changes{why_not}: each has the width at {s_m} m"));
     }
-    let widths_m: Vec<f64> = driving.iter().map(|lane| lane.width_in_scenario_m(used_lane, s_m, &mut notes)).collect();
-    if changes(lanes, "laneOffset") {
-        notes.push(format!("a lane offset that changes: the lanes have the offset at {s_m} m"));
+    let widths_m: Vec<f64> = match is_kept {
+        true => Vec::new(),
+        false => driving.iter().map(|lane| lane.width_in_scenario_m(used_lane, s_m, &mut notes)).collect(),
+    };
+    if !is_kept && changes(lanes, "laneOffset") {
+        notes.push(format!("a lane offset that changes{why_not}: the lanes have the offset at {s_m} m"));
     }
     let speed_limit_mps = speed_limits(path, road, &mut notes)?;
     let mut centres_m = centres_m(lanes, along, &driving, place);
@@ -292,26 +357,34 @@ pub(super) fn read(path: &Path, text: &str, used: &UsedRoad<'_>) -> Result<Impor
             _ => {}
         }
     }
-    note_gaps(&driving, &centres_m, &mut notes);
+    if !is_kept {
+        note_gaps(&driving, &centres_m, &mut notes);
+    }
     // The lane of the ego keeps its place, also if others are elsewhere in the file.
     let used_index = driving.iter().position(|lane| lane.id == used_lane.id).unwrap_or_default();
     let centre_m = centres_m.get(used_index).copied().unwrap_or_default();
     let left_edge_m = centre_m + widths_m.iter().take(used_index).sum::<f64>() + 0.5 * used_lane.width_m;
+    let left_edge_m = changing.as_ref().map_or(left_edge_m, ChangingLanes::leftmost_m);
     let alignment_d_m = (-left_edge_m * 1e9).round() / 1e9 + 0.0;
     let (curvature_per_m, alignment) = curvature(path, road, alignment_d_m, &mut notes)?;
-    let lanes = driving.iter().map(|lane| lane.id).collect();
-    let line = reference_line(path, road, length_m, curvature_per_m, alignment);
+    let lanes: Vec<i32> = match &changing {
+        Some(changing) => changing.ids.clone(),
+        None => driving.iter().map(|lane| lane.id).collect(),
+    };
+    let line = reference_line(path, road, length_m, curvature_per_m, alignment.as_ref());
     Ok(ImportedRoad {
         id: road.raw("id").unwrap_or_default().to_owned(),
         is_left_hand,
         length_m,
         lanes,
+        changing,
         centres_m,
         widths_m,
         curvature_per_m,
         alignment,
         alignment_d_m,
         sections,
+        numbering,
         acceleration_lane: entry.map(|entry| entry.positions),
         line,
         speed_limit_mps,
@@ -408,7 +481,7 @@ fn reference_line(
     road: &Node,
     length_m: f64,
     curvature_per_m: f64,
-    alignment: Option<Alignment>,
+    alignment: Option<&Alignment>,
 ) -> Option<ReferenceLine> {
     let geometries: Vec<&Node> = road.child("planView")?.all("geometry").collect();
     let first = geometries.first()?;
@@ -423,7 +496,10 @@ fn reference_line(
     };
     let value = |name| number(path, first, name).ok();
     let straight = Road::straight(1);
-    let course = alignment.map_or(straight.with_curvature(curvature_per_m), |line| straight.with_alignment(line));
+    let course = match alignment {
+        Some(line) => straight.with_alignment(line.clone()),
+        None => straight.with_curvature(curvature_per_m),
+    };
     let (x_m, y_m, heading_rad) = (value("x")?, value("y")?, value("hdg")?);
     is_followed.then_some(ReferenceLine { x_m, y_m, heading_rad, length_m, course })
 }
@@ -592,10 +668,10 @@ mod tests {
             (&right.widths_m[..], &right.centres_m[..], right.notes.len()),
             (&[3.25, 4.0][..], &[-2.625, -6.25][..], 1)
         );
-        assert_eq!([0, 1].map(|index| right.centre_m(index)), [-1.625, -5.25]);
+        assert_eq!([0, 1].map(|index| right.centre_m(index, 0.0)), [-1.625, -5.25]);
         assert_eq!(right.alignment_d_m, 1.0);
         // A place belongs to the lane between whose edges it lies, though another centre may be nearer.
-        let near = [-0.9, -4.2, -4.3, -4.5, -99.0].map(|t_m| right.lane_near(t_m));
+        let near = [-0.9, -4.2, -4.3, -4.5, -99.0].map(|t_m| right.lane_near(0.0, t_m));
         assert_eq!(near, [Some(0), Some(0), Some(1), Some(1), Some(1)]);
         // With left-hand traffic, the lane with the greatest number is the leftmost.
         let left = road_with([3.25, 4.0], "LHT", "left", "").unwrap();
@@ -613,7 +689,7 @@ mod tests {
     }
 
     #[test]
-    fn a_width_that_changes_is_noted_wherever_it_moves_the_lanes() {
+    fn a_width_that_no_scenario_has_is_noted_wherever_it_moves_the_lanes() {
         let lane = |id: i32, kind: &str, widths: &str| format!("<lane id=\"{id}\" type=\"{kind}\">{widths}</lane>");
         let (narrow, wide) = ("<width a=\"3\"/>", "<width a=\"3.5\"/>");
         let widens = "<width a=\"3\"/><width sOffset=\"50\" a=\"3\" b=\"0.01\"/>";
@@ -631,17 +707,20 @@ mod tests {
                 .map_err(|error| error.to_string())
         };
         let two = |second: &str| [lane(-1, "driving", narrow), lane(-2, "driving", second)];
-        let note = Ok(vec!["lanes whose width changes: each has the width at 0 m".to_owned()]);
+        let note = |reason| Ok(vec![format!("lanes whose width changes ({reason}): each has the width at 0 m")]);
         assert_eq!(imported(&[&two(narrow), &two(narrow)]), Ok(vec![]));
-        assert_eq!(imported(&[&two(narrow), &two(wide)]), note);
-        assert_eq!(imported(&[&two(narrow), &two(widens)]), note);
+        assert_eq!(imported(&[&two(narrow), &two(wide)]), note("a boundary jumps by 0.50 m at 300 m"));
+        let too_wide = "lane -2 is up to 8.50 m wide, and 2.5 to 5 m are allowed";
+        assert_eq!(imported(&[&two(narrow), &two(widens)]), note(too_wide));
         // What is beside the driving lanes moves none of them; what is between them and the reference line does.
         let beside = |at: i32, widths: &str| {
             let driving = if at == -1 { -2 } else { -1 };
             imported(&[&[lane(driving, "driving", narrow), lane(at, "none", widths)]])
         };
         assert_eq!(beside(-2, widens), Ok(vec![]));
-        assert_eq!(beside(-1, widens), note);
+        let steep = "<width a=\"3\"/><width sOffset=\"50\" a=\"3\" b=\"0.2\"/>";
+        let too_steep = "a boundary moves sideways by 0.200 m in each metre at 50 m, and 0.15 m are allowed";
+        assert_eq!(beside(-1, steep), note(too_steep));
         let border = beside(-1, "<border a=\"-2\"/>").unwrap_err();
         assert!(border.contains("`border`: the width of a lane is read from `width`, and it has none"), "{border}");
     }

@@ -1,14 +1,14 @@
 //! The lane sections of an OpenDRIVE road: where along the road each driving lane is.
 //!
-//! A scenario's road has the same lanes everywhere, but for an acceleration lane. The import
-//! therefore takes the lanes of one place, and refuses a vehicle that drives where its lane is
-//! missing, or whose lane has another number further on.
+//! The import refuses a vehicle that drives where its lane is missing. It refuses a vehicle whose lane
+//! has another number further on, too, unless the lanes have a [`Numbering`] of their own.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::dom::{ImportError, Node};
 use super::entry_lane;
+use super::numbering::Numbering;
 
 /// A lane section.
 #[derive(Clone, Debug)]
@@ -45,6 +45,14 @@ impl LaneSections {
             last.renumbered = None;
         }
         Self(sections)
+    }
+
+    /// Gives the lanes the numbers that they have in the import.
+    pub(super) fn renumber(&mut self, numbering: &Numbering) {
+        for (index, section) in self.0.iter_mut().enumerate() {
+            section.renumbered = None;
+            section.lanes = section.lanes.iter().filter_map(|id| numbering.number(index, *id)).collect();
+        }
     }
 
     /// Returns whether a driving lane begins or ends within the road.

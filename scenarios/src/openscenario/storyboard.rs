@@ -743,7 +743,12 @@ impl<'a> Storyboard<'a> {
         let from = self.vehicles[actor].lane;
         #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road below")]
         let to = match target.name.as_str() {
-            "AbsoluteTargetLane" => shift as i32,
+            "AbsoluteTargetLane" => {
+                let (id, at_m) = (shift as i32, self.vehicles[actor].s_m);
+                let to = self.road.number(id, at_m);
+                let message = || format!("lane {id} is not a driving lane along the road at {at_m:.2} m");
+                to.ok_or_else(|| self.reader.error(target, message()))?
+            }
             "RelativeTargetLane" => self.shifted(self.vehicle(target, "entityRef")?.lane, shift as i32),
             _ => return Err(self.reader.error(target, "this target is not read")),
         };
@@ -767,7 +772,8 @@ impl<'a> Storyboard<'a> {
                 .error(target, format!("from lane {from} to lane {to}: only the next lane is read")));
         }
         let dynamics = self.reader.child(node, &["LaneChangeActionDynamics"])?;
-        let way_m = self.road.half_width_m(from_index) + self.road.half_width_m(to_index);
+        let at_m = self.vehicles[actor].s_m;
+        let way_m = self.road.half_width_m(from_index, at_m) + self.road.half_width_m(to_index, at_m);
         let (duration_s, _) = self.transition(dynamics, 0.0, way_m, self.vehicles[actor].speed_mps)?;
         let at_s = self.time_s;
         (self.vehicles[actor].lane, self.vehicles[actor].offset_m) = (to, 0.0);
@@ -1041,24 +1047,28 @@ impl<'a> Storyboard<'a> {
             return Err(self.reader.error(node, message));
         }
         #[expect(clippy::cast_possible_truncation, reason = "compared with the lanes of the road")]
-        let lane = self.reader.number(node, "laneId")? as i32;
-        Ok((self.reader.number(node, "s")?, lane))
+        let id = self.reader.number(node, "laneId")? as i32;
+        let s_m = self.reader.number(node, "s")?;
+        let Some(lane) = self.road.number(id, s_m) else {
+            return Err(self.reader.error(node, format!("lane {id} is not a driving lane along the road at {s_m} m")));
+        };
+        Ok((s_m, lane))
     }
 
     /// Returns the position along the road (m) and the lane of a position in the plane.
     fn in_plane(&mut self, node: &Node, vehicle: usize, round: Round) -> Result<(f64, i32), ImportError> {
         let point = self.on_road(node, None)?;
         let heading_rad = self.reader.number_or(node, "h", 0.0)?;
-        if let Some(line) = self.road.line
+        if let Some(line) = &self.road.line
             && !(line.angle_rad(heading_rad, point.s_m).abs() <= MOST_START_ANGLE_RAD)
         {
             return Err(self.reader.error(node, "`h` is not the direction of the road: a vehicle starts along it"));
         }
-        let Some(index) = self.road.lane_near(point.t_m) else {
+        let Some(index) = self.road.lane_near(point.s_m, point.t_m) else {
             return Err(self.reader.error(node, "the road has no lane"));
         };
-        let beside_m = point.t_m - self.road.centres_m[index];
-        if !(beside_m.abs() <= self.road.half_width_m(index)) {
+        let beside_m = point.t_m - self.road.file_centre_m(index, point.s_m);
+        if !(beside_m.abs() <= self.road.half_width_m(index, point.s_m)) {
             return Err(self.reader.error(node, format!("it lies {:.2} m beside the nearest lane", beside_m.abs())));
         }
         if beside_m.abs() > NOTED_OFFSET_M && round == Round::Checked {
@@ -1121,10 +1131,11 @@ impl<'a> Storyboard<'a> {
             "RelativeRoadPosition" => {
                 let Some(other) = self.placed(node, round)? else { return Ok(()) };
                 let shift_m = reader.number(node, "dt")?;
-                let from_m = self.road.index(other.lane).map_or(f64::NAN, |index| self.road.centres_m[index]);
-                let beside_m = |index: usize| (from_m + shift_m - self.road.centres_m[index]).abs();
-                let near = self.road.lane_near(from_m + shift_m);
-                let Some(index) = near.filter(|index| beside_m(*index) <= 0.4 * self.road.half_width_m(*index)) else {
+                let (road, at_m) = (self.road, other.s_m);
+                let from_m = road.index(other.lane).map_or(f64::NAN, |index| road.file_centre_m(index, at_m));
+                let beside_m = |index: usize| (from_m + shift_m - road.file_centre_m(index, at_m)).abs();
+                let near = road.lane_near(at_m, from_m + shift_m);
+                let Some(index) = near.filter(|index| beside_m(*index) <= 0.4 * road.half_width_m(*index, at_m)) else {
                     let lanes: Vec<_> = self.road.lanes.iter().map(ToString::to_string).collect();
                     let message = format!(
                         "`dt` of {shift_m} m does not lead to the centre of a driving lane along the road: these are {}",
@@ -1147,7 +1158,7 @@ impl<'a> Storyboard<'a> {
             let is_relative = !matches!(node.name.as_str(), "LanePosition" | "WorldPosition");
             return if round == Round::Set && is_relative { Ok(()) } else { Err(reader.error(node, message)) };
         }
-        let (lane, offset_m) = self.lane_beside(node, lane, offset_m)?;
+        let (lane, offset_m) = self.lane_beside(node, (lane, s_m), offset_m)?;
         let placed = &mut self.vehicles[vehicle];
         placed.start = (node.line, node.name.clone());
         (placed.s_m, placed.lane, placed.is_placed, placed.offset_m) = (s_m, lane, true, offset_m);

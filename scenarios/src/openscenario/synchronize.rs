@@ -193,9 +193,9 @@ impl Storyboard<'_> {
     fn target_m(&self, node: &Node, name: &str) -> Result<f64, ImportError> {
         let position = self.reader.only(self.reader.child(node, &[name])?)?;
         let point = self.on_road(position, None)?;
-        let lane = self.road.lane_near(point.t_m);
-        let beside_m = lane.map_or(f64::INFINITY, |lane| (point.t_m - self.road.centres_m[lane]).abs());
-        if !lane.is_some_and(|lane| beside_m <= self.road.half_width_m(lane)) {
+        let lane = self.road.lane_near(point.s_m, point.t_m);
+        let beside_m = lane.map_or(f64::INFINITY, |lane| (point.t_m - self.road.file_centre_m(lane, point.s_m)).abs());
+        if !lane.is_some_and(|lane| beside_m <= self.road.half_width_m(lane, point.s_m)) {
             return Err(self.reader.error(position, format!("it lies {beside_m:.2} m beside the nearest lane")));
         }
         Ok(point.s_m)

@@ -79,9 +79,9 @@ impl Storyboard<'_> {
         self.check_beginning(node, &points, vehicle)?;
         let lanes = &self.road.lanes;
         let mut lane_changes = Vec::new();
-        let lane_near = |t_m| self.road.lane_near(t_m);
-        let changes =
-            changes(&points, &self.road.centres_m, lane_near).map_err(|message| reader.error(line, message))?;
+        let centre_m = |lane: usize, s_m: f64| self.road.file_centre_m(lane, s_m);
+        let lane_near = |point: &RoadPoint| self.road.lane_near(point.s_m, point.t_m);
+        let changes = changes(&points, centre_m, lane_near).map_err(|message| reader.error(line, message))?;
         for Change { from, to, at_s, duration_s } in changes {
             let (from, to, line, element) = (lanes[from], lanes[to], node.line, "FollowTrajectoryAction");
             lane_changes.push(LaneChange { vehicle, at_s, from, to, duration_s, line, element });
@@ -127,7 +127,7 @@ impl Storyboard<'_> {
         let reader = &self.reader;
         match position.name.as_str() {
             "WorldPosition" => {
-                let Some(line) = self.road.line else {
+                let Some(line) = &self.road.line else {
                     let message = "a position in the plane needs a road whose course is imported, with its start";
                     return Err(reader.error(position, message));
                 };
@@ -135,8 +135,7 @@ impl Storyboard<'_> {
             }
             "LanePosition" => {
                 let (s_m, lane) = self.on_lane(position)?;
-                let index = self.road.lanes.iter().position(|candidate| *candidate == lane);
-                let Some(centre_m) = index.and_then(|index| self.road.centres_m.get(index)) else {
+                let Some(centre_m) = self.road.index(lane).map(|index| self.road.file_centre_m(index, s_m)) else {
                     let message = format!("lane {lane} is not a driving lane along the road");
                     return Err(reader.error(position, message));
                 };
@@ -153,7 +152,7 @@ impl Storyboard<'_> {
             let message = format!("its trajectory begins at {first_s:.2} s, and its event at {now_s:.2} s");
             return Err(self.reader.error(node, message));
         }
-        let lane = self.road.lane_near(first.on_road.t_m).map(|index| self.road.lanes[index]);
+        let lane = self.road.lane_near(first.on_road.s_m, first.on_road.t_m).map(|index| self.road.lanes[index]);
         if (first.on_road.s_m - vehicle.s_m).abs() > MOST_APART_M || lane != Some(vehicle.lane) {
             let message = format!(
                 "its trajectory begins at s = {:.2} m, t = {:.2} m, and `{}` is at s = {:.2} m in lane {}",
@@ -191,16 +190,17 @@ fn speeds(points: &[Point]) -> Result<Vec<(f64, f64)>, String> {
     Ok(speeds)
 }
 
-/// Returns the lane changes of a trajectory among lanes with these centres (m). `lane_near` gives the
-/// lane of a lateral position.
+/// Returns the lane changes of a trajectory. `centre_m` gives the centre of a lane at a position along
+/// the road (m), and `lane_near` the lane of a place.
 fn changes(
     points: &[Point],
-    centres_m: &[f64],
-    lane_near: impl Fn(f64) -> Option<usize>,
+    centre_m: impl Fn(usize, f64) -> f64,
+    lane_near: impl Fn(&RoadPoint) -> Option<usize>,
 ) -> Result<Vec<Change>, String> {
+    let beside_m = |lane: usize, point: &Point| point.on_road.t_m - centre_m(lane, point.on_road.s_m);
     let lane_of = |point: &Point| {
-        let lane = lane_near(point.on_road.t_m);
-        let lane = lane.filter(|lane| (centres_m[*lane] - point.on_road.t_m).abs() <= MOST_BESIDE_M);
+        let lane = lane_near(&point.on_road);
+        let lane = lane.filter(|lane| beside_m(*lane, point).abs() <= MOST_BESIDE_M);
         lane.ok_or_else(|| format!("at {:.2} s it leaves the lanes of the road", point.at_s))
     };
     let mut changes = Vec::new();
@@ -216,8 +216,8 @@ fn changes(
         if to.abs_diff(from) > 1 {
             return Err(format!("at {:.2} s it passes more than one lane between two vertices", points[index].at_s));
         }
-        let way_m = centres_m[to] - centres_m[from];
-        let share = |point: &Point| (point.on_road.t_m - centres_m[from]) / way_m;
+        let way_m = |s_m: f64| centre_m(to, s_m) - centre_m(from, s_m);
+        let share = |point: &Point| beside_m(from, point) / way_m(point.on_road.s_m);
         let begin = (0..index).rev().find(|index| share(&points[*index]) <= BEGUN);
         let begun_s = begin.map_or(first.at_s, |begin| time_at(&points[begin..=begin + 1], share, BEGUN));
         let end = (index..points.len())
@@ -272,8 +272,10 @@ mod tests {
     fn changes(points: &[Point], lanes: u32) -> Result<Vec<Change>, String> {
         let centres_m: Vec<f64> = (0..lanes).map(|lane| -1.75 - 3.5 * f64::from(lane)).collect();
         let beside_m = |lane: usize, t_m: f64| (centres_m[lane] - t_m).abs();
-        let near = |t_m| (0..centres_m.len()).min_by(|a, b| beside_m(*a, t_m).total_cmp(&beside_m(*b, t_m)));
-        super::changes(points, &centres_m, near)
+        let near = |point: &RoadPoint| {
+            (0..centres_m.len()).min_by(|a, b| beside_m(*a, point.t_m).total_cmp(&beside_m(*b, point.t_m)))
+        };
+        super::changes(points, |lane, _| centres_m[lane], near)
     }
 
     #[test]

@@ -40,7 +40,7 @@ const DARKEST: f32 = 0.12;
 const LEAST_SUN: f32 = 0.05;
 
 /// The road surface as seen from one position of the lens.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Ground {
     /// Position of the lens in road coordinates (s, d) (m), with s modulo the period of the
     /// textures.
@@ -56,26 +56,44 @@ pub(crate) struct Ground {
 }
 
 /// The lanes whose markings are on the ground.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum GroundLanes {
     /// Lanes of one width (m).
     Equal { width_m: f32, lanes: f32 },
     /// The lateral positions of the markings from the left edge on (m), and the number of the last one.
     Each { markings_m: [f32; MOST_MARKINGS], last: usize },
+    /// The same at places along the road about the lens, between which the markings are lines, and the
+    /// right edge of the road (m).
+    Along { places: Vec<[f32; MOST_MARKINGS]>, last: usize, right_m: f32 },
 }
+
+/// Distance between two places of the markings (m). A marking with a kink between two of them deviates
+/// by a quarter of the kink per metre: 6 cm where an acceleration lane ends.
+const PLACE_EVERY_M: f32 = 4.0;
+/// Number of places on each side of the lens: to the end of the ground.
+const PLACES_REACH: usize = 88;
+const PLACES: usize = 2 * PLACES_REACH + 1;
+const _: () = assert!(PLACE_EVERY_M * PLACES_REACH as f32 >= GROUND_TO_M);
 
 /// Largest number of markings along a road.
 const MOST_MARKINGS: usize = 9;
 
 impl GroundLanes {
-    fn new(road: &Road) -> Self {
+    /// Creates the lanes about a lens at `s_m`.
+    fn new(road: &Road, s_m: f64) -> Self {
+        let markings_at = |s_m: f64| {
+            let marking_m = |number: usize| road.full_boundary_m(u8::try_from(number).unwrap_or(u8::MAX), s_m) as f32;
+            std::array::from_fn(marking_m)
+        };
+        let last = road.lanes().into();
         match road.equal_lane_width_m() {
             Some(width_m) => Self::Equal { width_m: width_m as f32, lanes: f32::from(road.lanes()) },
-            None => {
-                let markings_m =
-                    std::array::from_fn(|number| road.boundary_m(u8::try_from(number).unwrap_or(u8::MAX)) as f32);
-                Self::Each { markings_m, last: road.lanes().into() }
+            None if road.has_changing_lanes() => {
+                let at_m = |place: usize| s_m + f64::from(PLACE_EVERY_M) * (place as f64 - PLACES_REACH as f64);
+                let places = (0..PLACES).map(|place| markings_at(at_m(place))).collect();
+                Self::Along { places, last, right_m: road.right_edge_m() as f32 }
             }
+            None => Self::Each { markings_m: markings_at(s_m), last },
         }
     }
 
@@ -84,11 +102,13 @@ impl GroundLanes {
         match self {
             Self::Equal { width_m, lanes } => -lanes * width_m,
             Self::Each { markings_m, last } => markings_m[*last],
+            Self::Along { right_m, .. } => *right_m,
         }
     }
 
-    /// Returns the distance from the nearest marking (m), and whether it is an edge line.
-    fn nearest_marking(&self, d: f32) -> (f32, bool) {
+    /// Returns the distance from the nearest marking (m), and whether it is an edge line. `ahead` is
+    /// the distance along the road from the lens (m).
+    fn nearest_marking(&self, ahead: f32, d: f32) -> (f32, bool) {
         match self {
             Self::Equal { width_m, lanes } => {
                 let line = (split(-d / width_m + 0.5).0 as f32).clamp(0.0, *lanes);
@@ -100,6 +120,25 @@ impl GroundLanes {
                     let off = (d - marking_m).abs();
                     if off < nearest.0 {
                         nearest = (off, number == 0 || number == *last);
+                    }
+                }
+                nearest
+            }
+            Self::Along { places, last, .. } => {
+                let place = (ahead / PLACE_EVERY_M + PLACES_REACH as f32).clamp(0.0, (PLACES - 1) as f32);
+                let (from, share) = split(place);
+                #[expect(clippy::cast_sign_loss, reason = "clamped to the places")]
+                let from = (from as usize).min(PLACES - 2);
+                let share = if place >= (PLACES - 1) as f32 { 1.0 } else { share };
+                let mut nearest = (f32::INFINITY, false);
+                for (number, (before_m, behind_m)) in
+                    places[from].iter().zip(&places[from + 1]).take(last + 1).enumerate()
+                {
+                    let off = (d - (before_m + (behind_m - before_m) * share)).abs();
+                    // Where a lane has no width, its edge line is the marking.
+                    let is_edge = number == 0 || number == *last;
+                    if off < nearest.0 || (is_edge && off == nearest.0) {
+                        nearest = (off, is_edge);
                     }
                 }
                 nearest
@@ -178,7 +217,7 @@ impl Ground {
             sin: maths::sin(heading_rad) as f32,
             curvature_per_m: road.constant_curvature_per_m().unwrap_or(f64::NAN) as f32,
             course: road.alignment().map(|_| GroundCourse::new(road, s_m, d_m)),
-            lanes: GroundLanes::new(road),
+            lanes: GroundLanes::new(road, s_m),
         }
     }
 
@@ -257,7 +296,7 @@ impl Ground {
 
     /// Returns the share of the surface at this position that is covered by paint (0 to 1).
     fn paint_share(&self, s: f32, d: f32, run: f32) -> f32 {
-        let (off, is_edge) = self.lanes.nearest_marking(d);
+        let (off, is_edge) = self.lanes.nearest_marking(s - self.s_m, d);
         if is_edge {
             return if off < EDGE_LINE_HALF_M { 1.0 } else { 0.0 };
         }

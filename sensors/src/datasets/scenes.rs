@@ -44,7 +44,7 @@ impl RandomScene {
         let lane = Lane(rng.random_range(1..=road.lanes()));
         let state = VehicleState {
             s_m: rng.random_range(500.0..20_000.0),
-            d_m: road.lane_centre_m(lane) + rng.random_range(-0.5..0.5),
+            d_m: road.lane_centre_m(lane, 0.0) + rng.random_range(-0.5..0.5),
             heading_rad: rng.random_range(-0.01..0.01),
             speed_mps: rng.random_range(18.0..38.0),
             brake_light: rng.random_bool(0.2),
@@ -83,7 +83,7 @@ impl RandomScene {
             let changing = if rng.random_bool(0.15) { rng.random_range(-0.07..0.07) } else { 0.0 };
             let state = VehicleState {
                 s_m: self.ego.state.s_m - gap,
-                d_m: self.road.lane_centre_m(lane) + rng.random_range(-0.7..0.7) + 20.0 * changing,
+                d_m: self.road.lane_centre_m(lane, 0.0) + rng.random_range(-0.7..0.7) + 20.0 * changing,
                 heading_rad: rng.random_range(-0.01..0.01) + changing,
                 speed_mps: self.ego.state.speed_mps + rng.random_range(-5.0..14.0),
                 indicator: [Indicator::Off, Indicator::Left, Indicator::Right][rng.random_range(0..3)],
@@ -111,6 +111,7 @@ fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
         lanes: rng.random_range(2..=4),
         lane_width_m: rng.random_range(3.5..3.8).into(),
         curvature_per_m: Num::Fixed(if rng.random_bool(0.5) { rng.random_range(-0.001..0.001) } else { 0.0 }),
+        cross_sections: Vec::new(),
         alignment: Vec::new(),
         alignment_d_m: None,
         speed_limit_mps: Num::Fixed(36.1),

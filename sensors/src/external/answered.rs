@@ -49,14 +49,14 @@ impl OutsideTracks {
         for track in &answer.tracks {
             let id = *self.ids.entry(track.id.0).or_insert_with(|| list.new_id());
             let (state, covariance) = answer.pose.moved(&pose, (&track.state, &track.covariance), elapsed_s);
-            let (_, d_m) = frame.road_position_m(state[0], state[1]);
+            let (s_m, d_m) = frame.road_position_m(state[0], state[1]);
             list.tracks.push(Track {
                 id,
                 time,
                 state,
                 covariance,
                 heading_rad: track.heading_rad + answer.pose.yaw_rad - pose.yaw_rad,
-                lane: frame.lane_probabilities(d_m, covariance[(1, 1)].sqrt()),
+                lane: frame.lane_probabilities(s_m, d_m, covariance[(1, 1)].sqrt()),
                 ..track.clone()
             });
         }

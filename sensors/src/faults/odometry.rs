@@ -141,7 +141,7 @@ impl OdometryErrors {
     /// Returns the road as the map shows it.
     #[must_use]
     pub fn map_of(&self, road: &Road) -> Road {
-        let mut map = *road;
+        let mut map = road.clone();
         if self.curvature_per_m != 0.0 {
             map = map.with_added_curvature(self.curvature_per_m);
         }
@@ -151,19 +151,19 @@ impl OdometryErrors {
         if self.has_no_rails { map.without_guard_rails() } else { map }
     }
 
-    /// Returns the lateral position on the map of an ego at `d_m` (m). The ego measures its place
-    /// between the markings of its lane.
-    pub fn own_d_m(&self, road: &Road, d_m: f64) -> f64 {
+    /// Returns the lateral position on the map of an ego at (`s_m`, `d_m`) (m). The ego measures its
+    /// place between the markings of its lane.
+    pub fn own_d_m(&self, road: &Road, s_m: f64, d_m: f64) -> f64 {
         if self.lane_width_m == 0.0 {
             return d_m + self.lateral_m;
         }
         let map = self.map_of(road);
-        let on_map_m = match [map, *road].map(|road| road.equal_lane_width_m()) {
+        let on_map_m = match [&map, road].map(Road::equal_lane_width_m) {
             [Some(map_m), Some(width_m)] => d_m * (map_m / width_m),
             _ => {
-                let lane = road.lane_at(d_m);
-                let scale = map.lane_width_m(lane) / road.lane_width_m(lane);
-                map.lane_centre_m(lane) + (d_m - road.lane_centre_m(lane)) * scale
+                let lane = road.lane_at(s_m, d_m);
+                let scale = map.lane_width_m(lane, s_m) / road.lane_width_m(lane, s_m);
+                map.lane_centre_m(lane, s_m) + (d_m - road.lane_centre_m(lane, s_m)) * scale
             }
         };
         on_map_m + self.lateral_m
@@ -202,7 +202,7 @@ impl Belief {
         let faster_mps = errors.speed_scale * ego_state.speed_mps;
         let mut ego = scene.ego;
         ego.state.s_m += self.ahead_m;
-        ego.state.d_m = errors.own_d_m(scene.road, ego_state.d_m);
+        ego.state.d_m = errors.own_d_m(scene.road, ego_state.s_m, ego_state.d_m);
         ego.state.heading_rad += errors.heading_rad;
         ego.state.speed_mps += faster_mps;
         let [seen, believed] = [EgoFrame::new(scene.road, &ego_state), EgoFrame::new(map, &ego.state)];

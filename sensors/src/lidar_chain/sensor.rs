@@ -201,7 +201,7 @@ impl ChainSensor {
         self.pending.push_back(PendingScan {
             number: self.scans,
             time: scan.end,
-            road: *road,
+            road: road.clone(),
             ego,
             detections,
             due_step,
@@ -236,7 +236,7 @@ impl ChainSensor {
         let mut scan = PendingScan {
             number: self.scans,
             time: scene.time,
-            road: *believed.road,
+            road: believed.road.clone(),
             ego: believed.ego.state,
             is_missing: new.is_missing(),
             detections: new.detections,

@@ -253,7 +253,7 @@ impl Faulty {
             width_m,
             class: ClassScores(scores),
             existence: GHOST_CONFIDENCE,
-            lane: input.frame.lane_probabilities(ego.state.d_m, GHOST_SD[0]),
+            lane: input.frame.lane_probabilities(ego.state.s_m, ego.state.d_m, GHOST_SD[0]),
         })
     }
 }

@@ -122,7 +122,7 @@ impl ObjectSensor {
             s_m: state.s_m - 0.5 * size.length_m,
             d_m: state.d_m,
             speed_mps: state.speed_mps,
-            half_lane_m: 0.5 * input.scene.road.lane_width_m(input.scene.road.lane_at(state.d_m)),
+            half_lane_m: 0.5 * input.scene.road.lane_width_m(input.scene.road.lane_of(state), state.s_m),
         };
         // Fog and rain matter to the rear sensor only, which is optical. Radars are unaffected over
         // these distances.
@@ -417,7 +417,11 @@ impl ObjectSensor {
                 false => unrecognised(self.model.class_confidence.of(other.class)),
             },
             existence: report.lifecycle.existence(),
-            lane: input.frame.lane_probabilities(across.position_m, across.position_variance_m2.sqrt()),
+            lane: input.frame.lane_probabilities(
+                report.along.position_m,
+                across.position_m,
+                across.position_variance_m2.sqrt(),
+            ),
         }
     }
 }

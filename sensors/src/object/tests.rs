@@ -91,9 +91,9 @@ fn the_rear_vehicle_is_confirmed_beyond_100_m() {
 }
 
 /// Returns the normalised error squared of the rear track's position and velocity after 100 scans.
-fn rear_error_squared(sample: u64, road: Road) -> f64 {
+fn rear_error_squared(sample: u64, road: &Road) -> f64 {
     let (mut encounter, mut perception) = (Encounter::new(), perception(sample));
-    encounter.road = road;
+    encounter.road = road.clone();
     for _ in 0..100 {
         perception.step(&encounter.scene()).unwrap();
         encounter.advance();
@@ -115,9 +115,9 @@ fn the_covariance_covers_the_errors() {
     let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
     let straight = Road::straight(3);
     let course = straight.with_alignment(Alignment::new(&points).unwrap());
-    for road in [straight, straight.with_curvature(0.001), course] {
+    for road in [straight.clone(), straight.with_curvature(0.001), course] {
         let samples = 200;
-        let mean = (0..samples).map(|sample| rear_error_squared(sample, road)).sum::<f64>() / samples as f64;
+        let mean = (0..samples).map(|sample| rear_error_squared(sample, &road)).sum::<f64>() / samples as f64;
         // The vehicle does not manoeuvre, so its errors are smaller than the process noise allows
         // for: about 4, the number of dimensions, at most, but not much less.
         assert!((1.0..4.4).contains(&mean), "mean normalised error squared {mean} on {road:?}");

@@ -188,7 +188,7 @@ impl RearRadars {
         let mut others = std::mem::take(&mut self.others);
         let result = self.scan(scene, &mut others);
         self.others = others;
-        let (time, road, ego) = (scene.time, *believed.road, believed.ego.state);
+        let (time, ego) = (scene.time, believed.ego.state);
         let returns = result?;
         for ((side, pending), returns) in SIDES.into_iter().zip(&mut self.pending).zip(&returns) {
             let fault = self.faults.of_side(side).at(time).unwrap_or_default();
@@ -200,6 +200,7 @@ impl RearRadars {
                 let due_step = due_step.max(latest.map_or(0, |(due_step, _)| *due_step));
                 untold.push_back((due_step, OutsideRadarScan { side, time, detections: detections.clone() }));
             }
+            let road = believed.road.clone();
             pending.push_back(PendingScan { time, usual_step, due_step, road, ego, detections });
         }
         self.latest = (Some(time), returns);

@@ -13,7 +13,7 @@ const RAIN: Environment =
 const FOG: Environment = Environment { visibility_m: 300.0, ..Environment::CLEAR_DAY };
 
 /// A drive of 10 s.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Drive<'a> {
     sensors: &'a str,
     fault: &'a str,
@@ -82,13 +82,13 @@ fn faultless_sensors_raise_nothing_on_any_road_in_any_weather_and_at_a_standstil
     let usual = Drive::default();
     let rails = road("lanes = 3\nguard-rails = true\ncurvature-per-m = 0.001");
     let drives = [
-        usual,
-        Drive { speed_mps: 0.0, ..usual },
-        Drive { road: rails, ..usual },
-        Drive { has_neighbours: true, ..usual },
+        usual.clone(),
+        Drive { speed_mps: 0.0, ..usual.clone() },
+        Drive { road: rails.clone(), ..usual },
+        Drive { has_neighbours: true, ..usual.clone() },
         Drive { has_neighbours: true, speed_mps: 0.0, road: rails, ..usual },
-        Drive { environment: RAIN, has_neighbours: true, ..usual },
-        Drive { environment: FOG, ..usual },
+        Drive { environment: RAIN, has_neighbours: true, ..usual.clone() },
+        Drive { environment: FOG, ..usual.clone() },
         Drive { environment: RAIN, speed_mps: 0.0, ..usual },
     ];
     let sensors = [
@@ -102,7 +102,7 @@ fn faultless_sensors_raise_nothing_on_any_road_in_any_weather_and_at_a_standstil
     ];
     for sensors in sensors {
         for (number, drive) in drives.iter().enumerate() {
-            for (step, alarms) in (Drive { sensors, ..*drive }).run().into_iter().enumerate() {
+            for (step, alarms) in (Drive { sensors, ..drive.clone() }).run().into_iter().enumerate() {
                 let all = alarms.front.and(alarms.surround).and(alarms.rear);
                 // Weather may leave less than half of the range.
                 let is_false = all.iter().any(|alarm| alarm != Alarm::ShortRange);

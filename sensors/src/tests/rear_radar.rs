@@ -22,7 +22,7 @@ struct Approach {
     health: Health,
 }
 
-fn approach(sensors: &str, fault: &str, sample: u64, road: Road) -> Approach {
+fn approach(sensors: &str, fault: &str, sample: u64, road: &Road) -> Approach {
     let text = format!("mode = \"full\"\nrear-camera.pipeline = \"off\"\n{sensors}");
     let sensors = toml::from_str::<SensorsConfig>(&text).unwrap().check(&Parameters::default()).unwrap();
     let entries: Vec<RadarFaultConfig> =
@@ -38,7 +38,7 @@ fn approach(sensors: &str, fault: &str, sample: u64, road: Road) -> Approach {
     let mut tracks = Vec::new();
     for step in 0..75 {
         let time = CONTROL_STEP * step;
-        let scene = Scene { time, road: &road, environment: &environment, ego, others: &[car] };
+        let scene = Scene { time, road, environment: &environment, ego, others: &[car] };
         let of_step = perception.step(&scene).unwrap().iter().filter(|track| track.source == Source::Rear);
         tracks.push(of_step.cloned().collect());
         for vehicle in [&mut ego, &mut car] {
@@ -63,8 +63,8 @@ fn variance_m2ps2(track: &Track) -> f64 {
 fn the_radar_makes_the_speed_of_a_new_track_surer_and_nearer_to_the_truth() {
     let (mut errors, mut normalised, mut count) = ([0.0; 2], 0.0, 0.0);
     for sample in 0..20 {
-        let alone = approach("", "", sample, Road::straight(3));
-        let fused = approach(RADAR, "", sample, Road::straight(3));
+        let alone = approach("", "", sample, &Road::straight(3));
+        let fused = approach(RADAR, "", sample, &Road::straight(3));
         let pairs = both(&alone, &fused);
         assert!(pairs.len() > 25, "{} steps", pairs.len());
         // The first 0.6 s of the track.
@@ -85,18 +85,18 @@ fn the_radar_makes_the_speed_of_a_new_track_surer_and_nearer_to_the_truth() {
 
 #[test]
 fn a_dead_radar_leaves_the_tracks_as_they_are_without_one_to_the_bit() {
-    let alone = approach("", "", 1, Road::straight(3));
-    let dead = approach(RADAR, "dead = true", 1, Road::straight(3));
+    let alone = approach("", "", 1, &Road::straight(3));
+    let dead = approach(RADAR, "dead = true", 1, &Road::straight(3));
     assert!(alone.tracks == dead.tracks);
     assert_eq!((alone.health, dead.health), (Health::Ok, Health::Degraded));
-    let working = approach(RADAR, "", 1, Road::straight(3));
+    let working = approach(RADAR, "", 1, &Road::straight(3));
     assert!(alone.tracks != working.tracks && working.health == Health::Ok);
 }
 
 #[test]
 fn a_late_radar_corrects_nothing_and_is_noticed() {
-    let alone = approach("", "", 1, Road::straight(3));
-    let late = approach(RADAR, "delay-s = 0.2", 1, Road::straight(3));
+    let alone = approach("", "", 1, &Road::straight(3));
+    let late = approach(RADAR, "delay-s = 0.2", 1, &Road::straight(3));
     assert!(alone.tracks == late.tracks, "a scan that is older than the tracks is not used");
     assert_eq!(late.health, Health::Degraded);
 }
@@ -106,12 +106,12 @@ fn a_ghost_starts_no_track_and_a_wrong_mounting_and_a_ghost_remain_unnoticed() {
     let ghost = "ghost-gap-m = 40.0\nghost-closing-mps = 5.0";
     let road = Road::straight(3);
     // The car is out of the LiDAR's view: only the radars detect something.
-    let blind = approach(&format!("rear-lidar.azimuth-deg = 80\n{RADAR}"), ghost, 0, road);
+    let blind = approach(&format!("rear-lidar.azimuth-deg = 80\n{RADAR}"), ghost, 0, &road);
     assert!(blind.tracks.iter().all(Vec::is_empty));
     assert_eq!(blind.health, Health::Ok);
-    let counts = |fault: &str| approach(RADAR, fault, 0, road).tracks.iter().map(Vec::len).collect::<Vec<_>>();
+    let counts = |fault: &str| approach(RADAR, fault, 0, &road).tracks.iter().map(Vec::len).collect::<Vec<_>>();
     assert_eq!(counts(ghost), counts(""), "the ghost is no track of its own");
-    assert_eq!(approach(RADAR, "yaw-deg = 3.0", 0, road).health, Health::Ok);
+    assert_eq!(approach(RADAR, "yaw-deg = 3.0", 0, &road).health, Health::Ok);
 }
 
 #[test]
@@ -119,13 +119,13 @@ fn the_radar_starts_no_track_and_ghosts_leave_the_speed_right() {
     let road = Road::straight(3).with_guard_rails();
     let ghosts = "rear-radar = { range-m = 200, ghost-probability = 1.0 }\n";
     for sample in 0..5 {
-        let fused = approach(ghosts, "", sample, road);
+        let fused = approach(ghosts, "", sample, &road);
         let last = fused.tracks.last().unwrap();
         let [track] = &last[..] else { panic!("{} tracks", last.len()) };
         assert_ne!(track.status, TrackStatus::Tentative);
         assert!((track.vx_mps() - CAR_MPS).abs() < 0.5, "{} m/s", track.vx_mps());
     }
     // The car is out of the LiDAR's view: it has no track.
-    let blind = approach(&format!("rear-lidar.azimuth-deg = 80\n{RADAR}"), "", 0, road);
+    let blind = approach(&format!("rear-lidar.azimuth-deg = 80\n{RADAR}"), "", 0, &road);
     assert!(blind.tracks.iter().all(Vec::is_empty));
 }

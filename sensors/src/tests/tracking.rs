@@ -126,7 +126,7 @@ impl Bench {
     /// Performs one scan that detects the vehicles for which `sees` is true, and returns the tracks
     /// after it.
     fn scan(&mut self, sees: impl Fn(usize) -> bool) -> &[Track] {
-        let (road, ego, others) = (self.road, self.ego, self.others.clone());
+        let (road, ego, others) = (self.road.clone(), self.ego, self.others.clone());
         let time = CONTROL_STEP * self.scans;
         let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         let mut truths = Vec::new();

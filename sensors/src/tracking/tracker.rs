@@ -382,7 +382,7 @@ impl Tracker {
             s_m: ego.s_m + rear_x_m,
             d_m: ego.d_m,
             speed_mps: ego.speed_mps * maths::cos(ego.heading_rad) / frame.path_scale(ego.s_m, ego.d_m),
-            half_lane_m: 0.5 * road.lane_width_m(road.lane_at(ego.d_m)),
+            half_lane_m: 0.5 * road.lane_width_m(road.lane_of(ego), ego.s_m),
         }
     }
 
@@ -743,6 +743,6 @@ fn to_track(track: &TrackState, [along, across]: [AxisEstimate; 2], frame: &EgoF
         width_m,
         class: track.class.scores(),
         existence: track.lifecycle.existence(),
-        lane: frame.lane_probabilities(across.position_m, across.position_variance_m2.sqrt()),
+        lane: frame.lane_probabilities(centre.position_m, across.position_m, across.position_variance_m2.sqrt()),
     }
 }

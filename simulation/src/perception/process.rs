@@ -155,7 +155,7 @@ pub fn identify_program(program: &ProgramSettings, scenario: &Scenario) -> Optio
     let setup = Setup {
         size,
         road: &scenario.road,
-        lane: scenario.road.lane_at(ego.start.d_m),
+        lane: scenario.road.lane_of(&ego.start),
         lidars: &lidars,
         radars: &radars,
         camera,

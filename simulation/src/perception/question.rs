@@ -29,7 +29,7 @@ impl<'a> Setup<'a> {
     /// Takes the content of the first message from a question.
     pub(super) fn of(question: &PerceptionQuestion<'a>) -> Self {
         let PerceptionQuestion { size, road, lidars, radars, camera, additional_cameras, latency_s, .. } = *question;
-        let lane = road.lane_at(question.ego.d_m);
+        let lane = road.lane_of(&question.ego);
         Self { size, road, lane, lidars, radars, camera, additional_cameras, latency_s }
     }
 
@@ -53,7 +53,7 @@ impl<'a> Setup<'a> {
 /// Returns the message of a control step.
 pub(super) fn scans(question: &PerceptionQuestion<'_>) -> Vec<u8> {
     let PerceptionQuestion { time, ego, road, pose, .. } = *question;
-    let lane = road.lane_at(ego.d_m);
+    let lane = road.lane_of(&ego);
     to_line(&Message::Scans(Box::new(Scans {
         time_s: time.s(),
         time_ns: time.ns(),
@@ -62,7 +62,7 @@ pub(super) fn scans(question: &PerceptionQuestion<'_>) -> Vec<u8> {
             acceleration_mps2: ego.acceleration_mps2,
             yaw_rate_radps: ego.yaw_rate_radps,
             lane: lane.0,
-            lane_offset_m: ego.d_m - road.lane_centre_m(lane),
+            lane_offset_m: ego.d_m - road.lane_centre_m(lane, ego.s_m),
         },
         pose,
         scans: question.scans.iter().map(scan_message).collect(),

@@ -11,16 +11,16 @@ use closecall_scenarios::Scenario;
 pub(super) fn odometry(scenario: &Scenario, world: &World) -> Odometry {
     let state = world.state(scenario.ego);
     let errors = scenario.sensors.odometry_errors().at(world.time());
-    let d_m = errors.own_d_m(&scenario.road, state.d_m);
+    let d_m = errors.own_d_m(&scenario.road, state.s_m, state.d_m);
     let map = errors.map_of(&scenario.road);
-    let lane = map.lane_at(d_m);
+    let lane = map.lane_at(state.s_m, d_m);
     let size = world.vehicle(scenario.ego).dimensions;
     Odometry {
         speed_mps: state.speed_mps * (1.0 + errors.speed_scale),
         acceleration_mps2: state.acceleration_mps2,
         yaw_rate_radps: state.yaw_rate_radps,
         lane,
-        lane_offset_m: d_m - map.lane_centre_m(lane),
+        lane_offset_m: d_m - map.lane_centre_m(lane, state.s_m),
         length_m: size.length_m,
         width_m: size.width_m,
     }

@@ -77,7 +77,9 @@ impl Events {
         self.states.iter().filter(is_now).find_map(|state| match state.event.then {
             Effect::Brake(_) => None,
             Effect::LaneChange { to, duration_s } => {
-                let target = road.beside(road.lane_at(world.state(actor).d_m), to)?;
+                let state = world.state(actor);
+                let way_m = [state.s_m, state.s_m + duration_s * state.speed_mps];
+                let target = road.beside(road.lane_of(state), to).filter(|target| road.is_open(*target, way_m))?;
                 Some(LaneChange { target, duration_s })
             }
         })

@@ -47,7 +47,7 @@ pub(super) fn human_drivers(scenario: &Scenario, key: RunKey, settings: &EgoSett
 }
 
 fn starts_in_acceleration_lane(actor: &Actor, road: &Road) -> bool {
-    road.entry_lane() == Some(road.lane_at(actor.start.d_m))
+    road.entry_lane() == Some(road.lane_of(&actor.start))
 }
 
 /// Returns how far the driver of each of `actors` vehicles looks. All others look ahead only.

@@ -127,7 +127,7 @@ impl<'a> Run<'a> {
                 weave: weave(actor, &scenario.road, key),
                 has_ideal_actuators: index == scenario.ego && scenario.interventions.has_ideal_actuation,
             });
-            World::new(scenario.road, scenario.environment.friction, scenario.physics_step, vehicles.collect())
+            World::new(scenario.road.clone(), scenario.environment.friction, scenario.physics_step, vehicles.collect())
         };
         let placed = scenario.actors[scenario.ego].start;
         let mut world = world_with(placed);
@@ -135,7 +135,7 @@ impl<'a> Run<'a> {
         if start != placed {
             world = world_with(start);
         }
-        let lane_m = scenario.road.lane_width_m(scenario.road.lane_at(world.state(scenario.ego).d_m));
+        let lane_m = own_lane_m(&scenario.road, world.state(scenario.ego));
         let widths = Widths { vehicle_m: 0.0, lane_m };
         let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
         let humans = human_drivers(&scenario, key, &of_arm);
@@ -433,10 +433,9 @@ impl<'a> Run<'a> {
     }
 
     fn widths(&self, actor: usize) -> Widths {
-        let road = &self.scenario.road;
         Widths {
             vehicle_m: self.world.vehicle(actor).dimensions.width_m,
-            lane_m: road.lane_width_m(road.lane_at(self.world.state(actor).d_m)),
+            lane_m: own_lane_m(&self.scenario.road, self.world.state(actor)),
         }
     }
 
@@ -492,4 +491,9 @@ impl<'a> Run<'a> {
             promise: Some(self.promise.finish()),
         }
     }
+}
+
+/// Returns the width of the lane in which a vehicle is (m).
+fn own_lane_m(road: &Road, vehicle: &VehicleState) -> f64 {
+    road.lane_width_m(road.lane_of(vehicle), vehicle.s_m)
 }

@@ -114,7 +114,7 @@ impl InCarRecorder {
         let start = start + Time::from_ns((CONTROL_STEP.ns() - start.ns() % CONTROL_STEP.ns()) % CONTROL_STEP.ns());
         let vehicle = &scenario.actors[actor].vehicle;
         (self.class, self.dimensions) = (vehicle.class, vehicle.dimensions);
-        self.run = Run { actor, road: scenario.road, start, has_ended: false, manoeuvre: None, previous: None };
+        self.run = Run { actor, road: scenario.road.clone(), start, has_ended: false, manoeuvre: None, previous: None };
     }
 
     /// Returns the log and the true lane changes.
@@ -125,14 +125,13 @@ impl InCarRecorder {
 
     /// Appends one row to the log.
     fn push_frame(&mut self, time: Time, state: &VehicleState) {
-        let Run { road, start, .. } = self.run;
-        let lane = road.lane_at(state.d_m);
+        let Run { road, start, .. } = &self.run;
+        let lane = road.lane_of(state);
+        let (lane_m, start) = (road.lane_width_m(lane, state.s_m), *start);
         let on_bus = time.is_multiple_of(CONTROL_STEP);
-        let left_edge_m = road.lane_centre_m(lane) + 0.5 * road.lane_width_m(lane);
-        let markings = MarkingDistances {
-            left_m: Some(left_edge_m - state.d_m),
-            right_m: Some(state.d_m - left_edge_m + road.lane_width_m(lane)),
-        };
+        let left_edge_m = road.lane_centre_m(lane, state.s_m) + 0.5 * lane_m;
+        let markings =
+            MarkingDistances { left_m: Some(left_edge_m - state.d_m), right_m: Some(state.d_m - left_edge_m + lane_m) };
         self.frames.push(InCarFrame {
             time: start + time,
             s_m: state.s_m,

@@ -84,7 +84,7 @@ impl Observer for TrafficRecorder {
         for (vehicle, trajectory) in view.vehicles.iter().zip(&mut self.trajectories[self.first_index..]) {
             let state = &vehicle.state;
             let (sin, cos) = maths::sin_cos(state.heading_rad);
-            let Lane(lane) = view.scenario.road.lane_at(state.d_m);
+            let Lane(lane) = view.scenario.road.lane_of(state);
             trajectory.points.push(TrajectoryPoint {
                 time,
                 s_m: state.s_m,

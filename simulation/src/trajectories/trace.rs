@@ -40,7 +40,7 @@ impl Observer for TraceRecorder {
         self.rows.extend(actors.map(|((actor, vehicle), &(gap_front_m, thw_front_s))| TraceRow {
             time: view.time,
             actor: actor.id.clone(),
-            lane: view.scenario.road.lane_at(vehicle.state.d_m),
+            lane: view.scenario.road.lane_of(&vehicle.state),
             s_m: vehicle.state.s_m,
             d_m: vehicle.state.d_m,
             speed_mps: vehicle.state.speed_mps,

@@ -49,9 +49,10 @@ pub(super) struct LaneBand {
 }
 
 impl LaneBand {
-    pub(super) fn new(road: &Road, lane: Lane) -> Self {
-        let centre_m = road.lane_centre_m(lane);
-        let half_m = 0.5 * road.lane_width_m(lane) - LANE_OVERLAP_M;
+    /// Creates the lane at a position along the road.
+    pub(super) fn new(road: &Road, lane: Lane, s_m: f64) -> Self {
+        let centre_m = road.lane_centre_m(lane, s_m);
+        let half_m = 0.5 * road.lane_width_m(lane, s_m) - LANE_OVERLAP_M;
         Self { right_m: centre_m - half_m, left_m: centre_m + half_m }
     }
 
@@ -71,11 +72,12 @@ pub(super) struct LanesAround {
 }
 
 impl LanesAround {
-    /// Returns the lanes around a vehicle at the lateral position `d_m`, within the sight of its
-    /// driver.
-    pub(super) fn new(road: &Road, d_m: f64, looks: Looks) -> Self {
-        let lane = road.lane_at(d_m);
-        let beside = |side| if looks.adjacent { road.beside(lane, side) } else { None };
+    /// Returns the lanes around a vehicle within the sight of its driver. A lane that is too narrow
+    /// for vehicles beside the vehicle is none of them.
+    pub(super) fn new(road: &Road, vehicle: &Extent, looks: Looks) -> Self {
+        let lane = road.lane_at(vehicle.s_m, vehicle.d_m);
+        let is_open = |beside: &Lane| road.is_open(*beside, [vehicle.s_m; 2]);
+        let beside = |side| if looks.adjacent { road.beside(lane, side).filter(is_open) } else { None };
         Self { own: lane, left: beside(Side::Left), right: beside(Side::Right) }
     }
 
@@ -173,13 +175,19 @@ impl Around {
 /// Sets `around` to the vehicles around `actor`, which is compared with every other one.
 /// [`super::search`] is faster if there are many vehicles.
 pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks, around: &mut Around) {
-    let lanes = LanesAround::new(road, extents[actor].d_m, looks);
+    let lanes = LanesAround::new(road, &extents[actor], looks);
     lanes.clear(around);
-    let band = |lane| LaneBand::new(road, lane);
-    let (own_lane, left, right) = (band(lanes.own), lanes.left.map(band), lanes.right.map(band));
+    let band_at = |lane, s_m| LaneBand::new(road, lane, s_m);
+    let band = |lane| band_at(lane, extents[actor].s_m);
+    let (mut own_lane, mut left, mut right) = (band(lanes.own), lanes.left.map(band), lanes.right.map(band));
     for other in (0..extents.len()).filter(|other| *other != actor) {
         let candidate = Candidate::new(extents, [actor, other]);
         let sides_m = extents[other].sides_m();
+        if road.has_changing_lanes() {
+            // A lane is elsewhere beside the other vehicle.
+            let band = |lane| band_at(lane, extents[other].s_m);
+            (own_lane, left, right) = (band(lanes.own), lanes.left.map(band), lanes.right.map(band));
+        }
         if own_lane.contains(sides_m) {
             candidate.insert_into(&mut around.own);
         }

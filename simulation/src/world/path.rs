@@ -20,6 +20,26 @@ pub(crate) struct LateralState {
     pub(crate) second_derivative_per_m: f64,
 }
 
+impl LateralState {
+    /// Returns this state relative to a line that has the state `line`, on the road.
+    pub(crate) fn plus(&self, line: &Self) -> Self {
+        Self {
+            d_m: self.d_m + line.d_m,
+            slope: self.slope + line.slope,
+            second_derivative_per_m: self.second_derivative_per_m + line.second_derivative_per_m,
+        }
+    }
+
+    /// Returns this state on the road, relative to a line that has the state `line`.
+    pub(crate) fn minus(&self, line: &Self) -> Self {
+        Self {
+            d_m: self.d_m - line.d_m,
+            slope: self.slope - line.slope,
+            second_derivative_per_m: self.second_derivative_per_m - line.second_derivative_per_m,
+        }
+    }
+}
+
 /// A smooth path from one lateral state to the centre of a lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LanePath(Quintic);

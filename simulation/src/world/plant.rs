@@ -111,8 +111,11 @@ pub(crate) struct Plant {
     /// The lateral path that the vehicle follows until its first lane change.
     path: Option<LateralPath>,
     /// The lateral state that the driver intends: on the lane's centre line, or on the path of the
-    /// lane change.
+    /// lane change. It is relative to the driving line of `guide` if there is one.
     intended: LateralState,
+    /// The lane whose driving line the driver follows, on a road whose lanes change their widths. The
+    /// lanes of another road, and a lateral path, need none.
+    guide: Option<Lane>,
     weave: Option<Weave>,
     /// Distance travelled along the lane since the start (m): the argument of `weave`.
     distance_m: f64,
@@ -145,6 +148,7 @@ impl Plant {
             lane_change: None,
             path: None,
             intended: LateralState { d_m: state.d_m, ..LateralState::default() },
+            guide: None,
             weave,
             distance_m: 0.0,
             deviation: Deviation::default(),
@@ -157,6 +161,18 @@ impl Plant {
         let Some(path) = path else { return self };
         let intended = on_path(&path, 0.0);
         Self { path: Some(path), intended, course_rad: maths::atan(intended.slope), ..self }
+    }
+
+    /// Returns the same vehicle in the lane of a road.
+    pub(crate) fn in_lane_of(mut self, road: &Road) -> Self {
+        if road.has_changing_lanes() && self.path.is_none() {
+            let lane = road.lane_of(&self.state);
+            let line = driving_line(road, lane, self.state.s_m, self.state.d_m);
+            self.guide = Some(lane);
+            self.intended.d_m -= line.d_m;
+            self.course_rad = maths::atan(line.slope);
+        }
+        self
     }
 
     /// Returns the same vehicle with actuators that follow the command at once.
@@ -197,7 +213,14 @@ impl Plant {
     /// requested if the tyres could not provide the lateral acceleration otherwise.
     pub(crate) fn change_lane(&mut self, change: LaneChange, road: &Road) {
         self.path = None;
-        let target_m = road.lane_centre_m(change.target);
+        let mut target_m = road.lane_centre_m(change.target, self.state.s_m);
+        if road.has_changing_lanes() {
+            let line = |lane| driving_line(road, lane, self.state.s_m, self.state.d_m);
+            let from = self.guide.map_or(LateralState::default(), line);
+            self.intended = self.intended.plus(&from).minus(&line(change.target));
+            self.guide = Some(change.target);
+            target_m = 0.0;
+        }
         let requested_m = change.duration_s * self.state.speed_mps;
         let mut path = LanePath::new(self.intended, target_m, requested_m.max(SHORTEST_LANE_CHANGE_M));
         let limit_per_m = lateral_grip_mps2(self.friction) / (self.state.speed_mps * self.state.speed_mps).max(1.0);
@@ -252,7 +275,16 @@ impl Plant {
         } else if let Some(path) = &self.path {
             self.intended = on_path(path, self.distance_m);
         }
-        let LateralState { d_m, slope, second_derivative_per_m } = self.lateral();
+        let mut lateral = self.lateral();
+        if let Some(lane) = self.guide {
+            let s_m = road.advanced_m(self.state.s_m, self.state.d_m, along_m);
+            lateral = lateral.plus(&driving_line(road, lane, s_m, self.state.d_m));
+            if self.lane_change.is_none() {
+                // A lane that ends may begin again: the vehicle then stays in the lane to which it came.
+                self.guide = Some(road.followed_lane(lane, s_m));
+            }
+        }
+        let LateralState { d_m, slope, second_derivative_per_m } = lateral;
         let (course_rad, curvature_per_m) = if slope == 0.0 {
             (slope, second_derivative_per_m)
         } else {
@@ -278,6 +310,18 @@ impl Plant {
             slope: self.intended.slope + self.deviation.slope,
             second_derivative_per_m: self.intended.second_derivative_per_m + self.deviation.second_derivative_per_m,
         }
+    }
+}
+
+/// Returns the lateral state on the driving line of a lane at `s_m`. Its derivatives are with respect
+/// to the distance along the lane of a vehicle at `d_m`.
+fn driving_line(road: &Road, lane: Lane, s_m: f64, d_m: f64) -> LateralState {
+    let [line_m, slope, second_derivative_per_m] = road.driving_line(lane, s_m);
+    let scale = road.path_scale(s_m, d_m);
+    LateralState {
+        d_m: line_m,
+        slope: slope / scale,
+        second_derivative_per_m: second_derivative_per_m / (scale * scale),
     }
 }
 
@@ -412,14 +456,17 @@ mod tests {
         let road = Road::straight(3).with_lane_widths(&[4.0, 3.25, 3.75]);
         for (target, centre_m) in [(Lane(3), -9.125), (Lane(1), -2.0)] {
             let mut car = car(30.0);
-            assert!((car.state().d_m - road.lane_centre_m(Lane(2))).abs() < 1e-12);
+            assert!((car.state().d_m - road.lane_centre_m(Lane(2), 0.0)).abs() < 1e-12);
             car.change_lane(LaneChange { target, duration_s: 5.0 }, &road);
             for _ in 0..=500 {
                 car.step(0.0, Indicator::Off, &road);
             }
             assert!(car.lane_change_target().is_none());
             assert!((car.state().d_m - centre_m).abs() < 1e-9, "{:?}", car.state());
-            assert!((road.lane_at(car.state().d_m), car.state().heading_rad.abs() < 1e-9) == (target, true));
+            assert!(
+                (road.lane_at(car.state().s_m, car.state().d_m), car.state().heading_rad.abs() < 1e-9)
+                    == (target, true)
+            );
         }
     }
 

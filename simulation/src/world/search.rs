@@ -61,7 +61,8 @@ impl NeighbourSearch {
     pub(super) fn find_all(&mut self, world: &World, road: &Road, looks: &[Looks], neighbours: &mut [Neighbours]) {
         self.extents.clear();
         self.extents.extend((0..world.len()).map(|actor| Extent::of(world, actor)));
-        let few = world.len() <= FEW;
+        // The lists are those of lanes that have one place along the road.
+        let few = world.len() <= FEW || road.has_changing_lanes();
         if !few {
             self.sort(road);
         }
@@ -95,7 +96,7 @@ impl NeighbourSearch {
         self.touched.clear();
         self.touched.extend(self.extents.iter().map(|extent| strips(road, extent.sides_m())));
         self.bands.clear();
-        self.bands.extend((1..=road.lanes()).map(|lane| LaneBand::new(road, Lane(lane))));
+        self.bands.extend((1..=road.lanes()).map(|lane| LaneBand::new(road, Lane(lane), 0.0)));
         let lists = self.lanes.len() + self.strips.len();
         self.ranks.resize(lists * self.extents.len(), 0);
         for &entry in &self.order {
@@ -133,7 +134,7 @@ impl NeighbourSearch {
 
     /// Sets `around` to the vehicles around `actor`.
     fn find(&self, actor: usize, road: &Road, looks: Looks, around: &mut Around) {
-        let lanes = LanesAround::new(road, self.extents[actor].d_m, looks);
+        let lanes = LanesAround::new(road, &self.extents[actor], looks);
         lanes.clear(around);
         self.fill(actor, lanes.own, &mut around.own);
         if let (Some(lane), Some(slot)) = (lanes.left, &mut around.left) {
@@ -225,7 +226,7 @@ impl NeighbourSearch {
 /// index never falls to the right.
 fn strips(road: &Road, [right_m, left_m]: [f64; 2]) -> RangeInclusive<usize> {
     let right_edge_m = road.right_edge_m();
-    let strip = |d_m: f64| match road.lane_at(d_m) {
+    let strip = |d_m: f64| match road.lane_at(0.0, d_m) {
         _ if d_m > 0.0 => 0,
         _ if d_m < right_edge_m => usize::from(road.lanes()) + 1,
         Lane(lane) => usize::from(lane),
@@ -271,7 +272,7 @@ mod tests {
             widths_m in prop::sample::select(vec![[3.75; 3], [3.0, 3.75, 4.5], [4.5, 2.5, 3.25]]),
         ) {
             let road = Road::straight(3).with_lane_widths(&widths_m);
-            let world = world(road, &vehicles);
+            let world = world(road.clone(), &vehicles);
             let mut neighbours = vec![Neighbours::default(); world.len()];
             let mut search = NeighbourSearch::default();
             for looks in [Looks::AROUND, Looks::AHEAD, Looks::AROUND] {
@@ -299,7 +300,7 @@ mod tests {
                     (class, 12.0 * index as f64, d_m, 0.0)
                 })
                 .collect();
-            let world = world(road, &vehicles);
+            let world = world(road.clone(), &vehicles);
             let mut search = NeighbourSearch::default();
             let looks = vec![Looks::AROUND; number];
             search.find_all(&world, &road, &looks, &mut vec![Neighbours::default(); number]);

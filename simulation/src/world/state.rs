@@ -100,7 +100,8 @@ impl World {
         let actors: Vec<Actor> = vehicles
             .into_iter()
             .map(|InitialVehicle { id, vehicle, state, path, weave, has_ideal_actuators }| {
-                let plant = Plant::new(&vehicle, state, weave, friction, step.s()).with_path(path);
+                let plant = Plant::new(&vehicle, state, weave, friction, step.s());
+                let plant = plant.with_path(path).in_lane_of(&road);
                 let body =
                     Body::Driven(Box::new(if has_ideal_actuators { plant.with_ideal_actuators() } else { plant }));
                 Actor { id, vehicle, body }

@@ -80,7 +80,7 @@ driver = {{ ego-stack = {{ acc = {{ time-gap-s = 1.0, set-speed-mps = 10.0 }} }}
         let mut recorder = Recorder::default();
         let key = RunKey { seed: 0, sample: 0 };
         let outcome = simulate(&scenario, key, &arm(BuiltIn::Acc), &mut recorder).unwrap();
-        Self { outcome, road: scenario.road, instants: recorder.instants, notes: recorder.notes }
+        Self { outcome, road: scenario.road.clone(), instants: recorder.instants, notes: recorder.notes }
     }
 
     /// Returns the time at which an actor's driver first reports `wanted` (s).
@@ -103,7 +103,7 @@ driver = {{ ego-stack = {{ acc = {{ time-gap-s = 1.0, set-speed-mps = 10.0 }} }}
 
     /// Returns the lane of an actor at `time_s`.
     pub(crate) fn lane(&self, actor: usize, time_s: f64) -> Lane {
-        self.road.lane_at(self.at(actor, time_s).d_m)
+        self.road.lane_of(self.at(actor, time_s))
     }
 
     /// Returns the times (s) and the accelerations (m/s²) that an actor's driver commands. They are the ones with which

@@ -64,7 +64,7 @@ fn the_overtaker_signals_before_it_pulls_out() {
 fn the_overtaker_crosses_the_marking_at_the_requested_headway() {
     for cut_out_thw_s in [0.15, 0.2, 0.3, 0.4] {
         let drive = Overtaker { cut_out_thw_s, cc1_s: 0.02, more: "" }.drive("", 60.0);
-        let crossing_s = drive.first_s(REAR, 0.0, |rear| drive.road.lane_at(rear.d_m) == Lane(1)).unwrap();
+        let crossing_s = drive.first_s(REAR, 0.0, |rear| drive.road.lane_at(rear.s_m, rear.d_m) == Lane(1)).unwrap();
         let [slow, rear] = [SLOW, REAR].map(|actor| drive.at(actor, crossing_s));
         let thw_s = gap_m(slow, rear) / rear.speed_mps;
         assert!((thw_s - cut_out_thw_s).abs() < 0.1, "{thw_s} instead of {cut_out_thw_s}");
@@ -80,7 +80,7 @@ fn the_overtaker_returns_after_passing_if_the_scenario_says_so() {
     assert_eq!(drive.lane(REAR, passed_s), Lane(1));
     let signals_s = drive.first_s(REAR, passed_s, |rear| rear.indicator == Indicator::Right).unwrap();
     assert!(signals_s - passed_s >= 1.0);
-    let centre_m = drive.road.lane_centre_m(Lane(2));
+    let centre_m = drive.road.lane_centre_m(Lane(2), 0.0);
     let returned_s = drive.first_s(REAR, signals_s, |rear| rear.d_m <= centre_m + 1e-9).unwrap();
     // The headway is long enough when the vehicle begins to return. It then grows, because the vehicle is faster.
     assert!(gap_m(drive.at(REAR, returned_s), drive.at(SLOW, returned_s)) > 0.8 * 28.0);
@@ -111,13 +111,13 @@ driver = {{ prescribed = {{ acceleration-profile = [[{from_s:?}, 5.0], [{to_s:?}
     );
     let drive = Overtaker::TYPICAL.drive(&shoots, 90.0);
     let aborted_s = drive.noted_s(REAR, DriverNote::CutOutAborted).unwrap();
-    let centre_m = drive.road.lane_centre_m(Lane(2));
+    let centre_m = drive.road.lane_centre_m(Lane(2), 0.0);
     let back_s = drive.first_s(REAR, aborted_s + 0.1, |rear| (rear.d_m - centre_m).abs() < 1e-9).unwrap();
     let meanwhile = || {
         let instants = drive.instants.iter().filter(|instant| (aborted_s..back_s).contains(&instant.time.s()));
         instants.map(|instant| &instant.vehicles[REAR])
     };
-    assert!(meanwhile().all(|rear| drive.road.lane_at(rear.d_m) == Lane(2)));
+    assert!(meanwhile().all(|rear| drive.road.lane_at(rear.s_m, rear.d_m) == Lane(2)));
     let hardest_mps2 = meanwhile().map(|rear| rear.acceleration_mps2).fold(0.0, f64::min);
     assert!(hardest_mps2 < -1.0, "{hardest_mps2}");
     // Once the other vehicle is past, the driver overtakes after all.

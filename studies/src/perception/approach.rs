@@ -115,7 +115,7 @@ struct Traffic {
 
 impl Traffic {
     fn new(case: &Case, road: &Road, gap_m: f64, closing_mps: f64) -> Self {
-        let ego_d_m = road.lane_centre_m(ego_lane(road));
+        let ego_d_m = road.lane_centre_m(ego_lane(road), 0.0);
         let vehicle = |actor, class, s_m, d_m, speed_mps| SceneVehicle {
             actor,
             vehicle: Vehicle::typical(class),

@@ -147,10 +147,10 @@ pub fn cases(mode: SensorMode, environment: &Environment, road: &Road) -> Result
 fn offsets(usual: &Case, road: &Road) -> impl Iterator<Item = Case> {
     let ego_lane = ego_lane(road);
     let sides = [(1.0, Side::Left, "left"), (-1.0, Side::Right, "right")];
-    let own_m = road.lane_width_m(ego_lane);
+    let own_m = road.lane_width_m(ego_lane, 0.0);
     let beside = sides.into_iter().filter_map(move |(sign, side, name)| {
         let lane = road.beside(ego_lane, side)?;
-        Some((sign, 0.5 * (own_m + road.lane_width_m(lane)), name))
+        Some((sign, 0.5 * (own_m + road.lane_width_m(lane, 0.0)), name))
     });
     beside.flat_map(move |(sign, lane_m, name)| {
         [lane_m, 0.5 * own_m].map(|offset_m| {
@@ -223,7 +223,7 @@ impl Case {
 
     /// Returns the road of the study with the guard rails of this case.
     pub(crate) fn road(&self, studied: &Road) -> Road {
-        if self.has_guard_rails { studied.with_guard_rails() } else { *studied }
+        if self.has_guard_rails { studied.with_guard_rails() } else { studied.clone() }
     }
 }
 

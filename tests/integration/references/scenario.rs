@@ -28,10 +28,12 @@ const SENSORS: [&str; 3] = ["front-radar", "surround", "rear-object"];
 
 #[test]
 fn the_scenario_reference_is_what_its_generator_writes() {
-    let written = scenario_page().unwrap();
+    let (written, committed) = (scenario_page().unwrap(), std::fs::read_to_string(at_root(PAGE)).unwrap());
+    let first = written.lines().zip(committed.lines()).find(|(written, committed)| written != committed);
     assert!(
-        std::fs::read_to_string(at_root(PAGE)).unwrap() == written,
-        "{PAGE} is out of date: run `cargo run --release -p closecall-xtask -- write-references` and commit the file"
+        committed == written,
+        "{PAGE} is out of date: run `cargo run --release -p closecall-xtask -- write-references` and commit the file\n\
+         the generator writes, and the file has: {first:#?}"
     );
 }
 

@@ -17,6 +17,8 @@
 //! [`STEP_RAD`]. Every displacement is formed between two positions, so a line at s = 100 km is as
 //! exact as one at s = 0.
 
+use std::sync::{Arc, OnceLock};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -62,13 +64,23 @@ pub struct AlignmentPoint {
     pub curvature_per_m: f64,
 }
 
-/// A line of piecewise linear curvature.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alignment {
-    count: usize,
-    points: [AlignmentPoint; Alignment::MAX_POINTS],
+/// A line of piecewise linear curvature. Its clones share their points.
+#[derive(Clone, Debug)]
+pub struct Alignment(Arc<Line>);
+
+#[derive(Debug)]
+struct Line {
+    points: Vec<AlignmentPoint>,
     /// The poses of the points, in the frame of the pose at s = 0.
-    poses: [PlanePose; Alignment::MAX_POINTS],
+    poses: Vec<PlanePose>,
+    /// The line in the opposite direction. A sensor that looks to the rear needs it in each scan.
+    reversed: OnceLock<Alignment>,
+}
+
+impl PartialEq for Alignment {
+    fn eq(&self, other: &Self) -> bool {
+        self.points() == other.points()
+    }
 }
 
 /// The way from one position of a line to another.
@@ -185,8 +197,9 @@ impl Check for AlignmentPointConfig {
 }
 
 impl Alignment {
-    /// Largest number of points.
-    pub const MAX_POINTS: usize = 64;
+    /// Largest number of points: 100 km with a curve every 25 m. It bounds the memory of a file that
+    /// is wrong.
+    pub const MAX_POINTS: usize = 4_096;
     /// Positions of points (m).
     pub const POSITION_M: Range = Range::closed(-10_000.0, 100_000.0);
     /// Curvatures (1/m): a radius of 250 m, the smallest one of the roads of ASAM's ALKS scenarios.
@@ -206,7 +219,7 @@ impl Alignment {
     /// in order: they increase by 1 m or more, or a position occurs twice.
     pub fn new(points: &[AlignmentPoint]) -> Result<Self, ConfigError> {
         if !(2..=Self::MAX_POINTS).contains(&points.len()) {
-            let problem = Problem::WrongLength { value: points.len() as u64, allowed: "2 to 64" };
+            let problem = Problem::WrongLength { value: points.len() as u64, allowed: "2 to 4096" };
             return Err(ConfigError::new("alignment", problem));
         }
         for (index, point) in points.iter().enumerate() {
@@ -222,31 +235,25 @@ impl Alignment {
                 return Err(at(ConfigError::new("s-m", Problem::Contradiction { other: "road.alignment", rule })));
             }
         }
-        Ok(Self::of(points.iter().copied()))
+        Ok(Self::of(points.to_vec()))
     }
 
-    /// Creates an alignment from points in order, at most [`Alignment::MAX_POINTS`] of them.
-    fn of(points: impl Iterator<Item = AlignmentPoint>) -> Self {
-        let origin = PlanePose { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0 };
-        let mut new =
-            Self { count: 0, points: [AlignmentPoint::default(); Self::MAX_POINTS], poses: [origin; Self::MAX_POINTS] };
-        for (slot, point) in new.points.iter_mut().zip(points) {
-            *slot = point;
-            new.count += 1;
+    /// Creates an alignment from points in order: at least one.
+    fn of(points: Vec<AlignmentPoint>) -> Self {
+        let new = |points, poses| Self(Arc::new(Line { points, poses, reversed: OnceLock::new() }));
+        let line = new(points, Vec::new());
+        let mut at = line.displacement(0.0, line.points()[0].s_m);
+        let mut poses = vec![at.pose()];
+        for (index, ends) in line.points().windows(2).enumerate() {
+            at = at.then(&line.piece(Some(index), ends[0].s_m, ends[1].s_m).displacement());
+            poses.push(at.pose());
         }
-        let mut at = new.displacement(0.0, new.points[0].s_m);
-        for index in 0..new.count {
-            new.poses[index] = at.pose();
-            if index + 1 < new.count {
-                at = at.then(&new.piece(Some(index), new.points[index].s_m, new.points[index + 1].s_m).displacement());
-            }
-        }
-        new
+        new(line.points().to_vec(), poses)
     }
 
     /// Returns the points, in the order of their positions.
     pub fn points(&self) -> &[AlignmentPoint] {
-        &self.points[..self.count]
+        &self.0.points
     }
 
     /// Returns the smallest and the largest curvature (1/m).
@@ -268,8 +275,8 @@ impl Alignment {
 
     /// Returns the curvature (1/m) at a position between the point `index` and the next one.
     fn curvature_after(&self, index: Option<usize>, s_m: f64) -> f64 {
-        let Some(index) = index else { return self.points[0].curvature_per_m };
-        let from = self.points[index];
+        let Some(index) = index else { return self.points()[0].curvature_per_m };
+        let from = self.points()[index];
         match self.points().get(index + 1) {
             Some(to) if to.curvature_per_m != from.curvature_per_m => {
                 let share = (s_m - from.s_m) / (to.s_m - from.s_m);
@@ -339,9 +346,9 @@ impl Alignment {
     /// Returns the pose of the line at a position, in the frame of the pose at s = 0.
     pub fn pose(&self, s_m: f64) -> PlanePose {
         let nearest = self.last_before(s_m).unwrap_or(0);
-        let at = self.poses[nearest];
+        let at = self.0.poses[nearest];
         let start = Displacement { along_m: at.x_m, across_m: at.y_m, turn_rad: at.yaw_rad };
-        start.then(&self.displacement(self.points[nearest].s_m, s_m)).pose()
+        start.then(&self.displacement(self.points()[nearest].s_m, s_m)).pose()
     }
 
     /// Returns the position along the line, and the distance to the left of it (m), of a point that
@@ -368,17 +375,16 @@ impl Alignment {
 
     /// Returns the line in the opposite direction: its positions are the negative ones.
     pub(crate) fn reversed(&self) -> Self {
-        let reversed = self.points().iter().rev();
-        Self::of(reversed.map(|point| AlignmentPoint { s_m: -point.s_m, curvature_per_m: -point.curvature_per_m }))
+        let turned =
+            |point: &AlignmentPoint| AlignmentPoint { s_m: -point.s_m, curvature_per_m: -point.curvature_per_m };
+        self.0.reversed.get_or_init(|| Self::of(self.points().iter().rev().map(turned).collect())).clone()
     }
 
     /// Returns the same line with another curvature at each point.
     pub(crate) fn bent(&self, to_per_m: impl Fn(f64) -> f64) -> Self {
-        Self::of(
-            self.points()
-                .iter()
-                .map(|point| AlignmentPoint { curvature_per_m: to_per_m(point.curvature_per_m), ..*point }),
-        )
+        let bent =
+            |point: &AlignmentPoint| AlignmentPoint { curvature_per_m: to_per_m(point.curvature_per_m), ..*point };
+        Self::of(self.points().iter().map(bent).collect())
     }
 }
 

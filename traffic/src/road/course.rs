@@ -4,8 +4,7 @@ use super::alignment::{Alignment, Displacement};
 use super::{PlanePose, maths};
 
 /// The course of a road.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "a road is copied once per scan at most, and stays `Copy`")]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Course {
     /// A line or an arc: d = 0 has this curvature everywhere (1/m).
     Constant(f64),
@@ -17,7 +16,7 @@ pub(crate) enum Course {
 ///
 /// The parallel of a clothoid is no clothoid. A reversed road therefore keeps the line of the
 /// original road, which is its right edge.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct OffsetLine {
     pub(crate) line: Alignment,
     /// Lateral position of the line on the road (m).

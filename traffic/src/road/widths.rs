@@ -1,6 +1,5 @@
-//! The widths of the lanes of a road: one for all of them, or one for each.
-//!
-//! The width of a lane is the same along the road. Only an acceleration lane narrows.
+//! The widths of the lanes of a road: one for all of them, one for each, or the cross-sections of a
+//! road whose lanes change ([`super::cross_sections`]).
 
 use std::borrow::Cow;
 use std::fmt;
@@ -10,6 +9,7 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{self, IntoDeserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::cross_sections::CrossSections;
 use crate::{ConfigError, KeyPath, Num, Parameters, Problem, Range, Segment};
 
 /// Largest number of lanes.
@@ -111,17 +111,19 @@ impl LaneWidthsConfig {
     }
 }
 
-fn plural(count: usize, name: &str) -> String {
+pub(super) fn plural(count: usize, name: &str) -> String {
     format!("{count} {name}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Checked widths of the lanes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum LaneWidths {
     /// The width of every lane (m).
     Equal(f64),
     /// The width of each lane (m), from lane 1 on; 0 beyond the last lane.
     Each([f64; MOST_LANES]),
+    /// The boundaries of the lanes along the road.
+    Along(CrossSections),
 }
 
 impl LaneWidths {
@@ -138,34 +140,45 @@ impl LaneWidths {
         Self::Each(each_m)
     }
 
-    /// Returns the width of a lane (m).
-    pub(super) fn width_m(&self, lane: u8) -> f64 {
+    /// Returns the width of a lane at a position along the road (m).
+    pub(super) fn width_m(&self, lane: u8, s_m: f64) -> f64 {
         match self {
             Self::Equal(width_m) => *width_m,
             Self::Each(each_m) => each_m.get(usize::from(lane).wrapping_sub(1)).copied().unwrap_or_default(),
+            Self::Along(along) => along.width_m(lane, s_m),
         }
     }
 
     /// Returns the lateral position of the right edge of lane `number` (m), or of the left edge of
     /// lane 1 if it is 0.
-    pub(super) fn boundary_m(&self, number: u8) -> f64 {
+    pub(super) fn boundary_m(&self, number: u8, s_m: f64) -> f64 {
         match self {
             Self::Equal(width_m) => -f64::from(number) * width_m,
             Self::Each(each_m) => each_m.iter().take(number.into()).fold(0.0, |edge_m, width_m| edge_m - width_m),
+            Self::Along(along) => along.boundary_m(number, s_m),
+        }
+    }
+
+    /// Returns the lateral position of the rightmost place of the right edge of lane `lanes` (m).
+    pub(super) fn right_edge_m(&self, lanes: u8) -> f64 {
+        match self {
+            Self::Equal(_) | Self::Each(_) => self.boundary_m(lanes, 0.0),
+            Self::Along(along) => along.right_edge_m(),
         }
     }
 
     /// Returns the lateral position of the centre of a lane (m).
-    pub(super) fn centre_m(&self, lane: u8) -> f64 {
+    pub(super) fn centre_m(&self, lane: u8, s_m: f64) -> f64 {
         match self {
             Self::Equal(width_m) => -(f64::from(lane) - 0.5) * width_m,
-            Self::Each(_) => self.boundary_m(lane) + 0.5 * self.width_m(lane),
+            Self::Each(_) => self.boundary_m(lane, s_m) + 0.5 * self.width_m(lane, s_m),
+            Self::Along(along) => along.centre_m(lane, s_m),
         }
     }
 
     /// Returns the lane of a road of `lanes` lanes in which a lateral position lies; beyond an edge,
     /// the lane at that edge.
-    pub(super) fn lane_at(&self, lanes: u8, d_m: f64) -> u8 {
+    pub(super) fn lane_at(&self, lanes: u8, s_m: f64, d_m: f64) -> u8 {
         match self {
             Self::Equal(width_m) => {
                 #[expect(
@@ -177,31 +190,46 @@ impl LaneWidths {
                 before + 1
             }
             Self::Each(_) => {
-                let passes = |number: &u8| d_m <= self.boundary_m(*number);
+                let passes = |number: &u8| d_m <= self.boundary_m(*number, s_m);
                 (1..lanes).take_while(passes).last().unwrap_or_default() + 1
             }
+            Self::Along(along) => along.lane_at(lanes, s_m, d_m),
         }
     }
 
-    /// Returns the widths of the same lanes, counted from the right.
-    pub(super) fn reversed(self, lanes: u8) -> Self {
+    /// Returns the smallest and the largest width of a lane (m).
+    pub(super) fn range_m(&self, lanes: u8) -> [f64; 2] {
+        if let Self::Along(along) = self {
+            return along.width_range_m(lanes);
+        }
+        let range = |[low_m, high_m]: [f64; 2], width_m: f64| [low_m.min(width_m), high_m.max(width_m)];
+        (1..=lanes).map(|lane| self.width_m(lane, 0.0)).fold([f64::INFINITY, f64::NEG_INFINITY], range)
+    }
+
+    /// Returns the widths of the same lanes, counted from the right. `to_m` gives the new position
+    /// along the road.
+    pub(super) fn reversed(&self, lanes: u8, to_m: impl Fn(f64) -> f64) -> Self {
         match self {
-            Self::Equal(_) => self,
-            Self::Each(mut each_m) => {
+            Self::Equal(width_m) => Self::Equal(*width_m),
+            Self::Each(each_m) => {
+                let mut each_m = *each_m;
                 each_m[..usize::from(lanes)].reverse();
                 Self::Each(each_m)
             }
+            Self::Along(along) => Self::Along(along.turned(lanes, to_m)),
         }
     }
 
     /// Returns the widths after a change of each of them (m).
-    pub(super) fn changed(self, lanes: u8, to_m: impl Fn(f64) -> f64) -> Self {
+    pub(super) fn changed(&self, lanes: u8, to_m: impl Fn(f64) -> f64) -> Self {
         match self {
-            Self::Equal(width_m) => Self::Equal(to_m(width_m)),
-            Self::Each(mut each_m) => {
+            Self::Equal(width_m) => Self::Equal(to_m(*width_m)),
+            Self::Each(each_m) => {
+                let mut each_m = *each_m;
                 each_m.iter_mut().take(lanes.into()).for_each(|width_m| *width_m = to_m(*width_m));
                 Self::Each(each_m)
             }
+            Self::Along(along) => Self::Along(along.changed(lanes, to_m)),
         }
     }
 }
@@ -226,15 +254,15 @@ mod tests {
     #[test]
     fn lanes_of_their_own_widths_lie_beside_each_other() {
         let road = road();
-        assert_eq!([0, 1, 2, 3].map(|number| road.boundary_m(number)), [0.0, -3.25, -6.75, -10.5]);
-        assert_eq!([1, 2, 3].map(|lane| road.lane_centre_m(Lane(lane))), [-1.625, -5.0, -8.625]);
-        assert_eq!([1, 2, 3].map(|lane| road.lane_width_m(Lane(lane))), WIDTHS_M);
-        assert_eq!(road.lane_widths_m().collect::<Vec<_>>(), WIDTHS_M);
+        assert_eq!([0, 1, 2, 3].map(|number| road.full_boundary_m(number, 0.0)), [0.0, -3.25, -6.75, -10.5]);
+        assert_eq!([1, 2, 3].map(|lane| road.lane_centre_m(Lane(lane), 0.0)), [-1.625, -5.0, -8.625]);
+        assert_eq!([1, 2, 3].map(|lane| road.lane_width_m(Lane(lane), 0.0)), WIDTHS_M);
+        assert_eq!(road.lane_widths_m(0.0).collect::<Vec<_>>(), WIDTHS_M);
         assert_eq!((road.right_edge_m(), road.lane_width_range_m()), (-10.5, [3.25, 3.75]));
         for (d_m, lane) in [(1.0, 1), (-3.24, 1), (-3.25, 2), (-3.5, 2), (-6.7, 2), (-6.8, 3), (-99.0, 3)] {
-            assert_eq!(road.lane_at(d_m), Lane(lane), "{d_m}");
+            assert_eq!(road.lane_at(0.0, d_m), Lane(lane), "{d_m}");
         }
-        assert_eq!(road.lane_at(f64::NAN), Road::straight(3).lane_at(f64::NAN));
+        assert_eq!(road.lane_at(0.0, f64::NAN), Road::straight(3).lane_at(0.0, f64::NAN));
     }
 
     #[test]
@@ -243,15 +271,15 @@ mod tests {
         assert_eq!(check("lanes = 3\nlane-width-m = [3.66, 3.66, 3.66]").unwrap(), road);
         assert_eq!(road.equal_lane_width_m(), Some(3.66));
         let different = check("lanes = 3\nlane-width-m = [3.25, 3.5, 3.75]").unwrap();
-        assert_eq!((different, different.equal_lane_width_m()), (self::road(), None));
+        assert_eq!((different.equal_lane_width_m(), different), (None, self::road()));
     }
 
     #[test]
     fn a_reversed_and_a_mirrored_road_have_their_lanes_in_the_other_order() {
         let road = road();
         for other in [road.reversed(), road.mirrored().unwrap()] {
-            assert_eq!(other.lane_widths_m().collect::<Vec<_>>(), [3.75, 3.5, 3.25]);
-            assert_eq!([0, 1, 2, 3].map(|number| other.boundary_m(number)), [0.0, -3.75, -7.25, -10.5]);
+            assert_eq!(other.lane_widths_m(0.0).collect::<Vec<_>>(), [3.75, 3.5, 3.25]);
+            assert_eq!([0, 1, 2, 3].map(|number| other.full_boundary_m(number, 0.0)), [0.0, -3.75, -7.25, -10.5]);
         }
         assert_eq!(road.reversed().reversed(), road);
         let entry = crate::AccelerationLane { from_m: 100.0, to_m: 350.0, taper_end_m: 410.0 };

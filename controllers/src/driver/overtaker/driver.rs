@@ -27,6 +27,9 @@ const LATERAL_CLEARANCE_M: f64 = 0.1;
 /// of lane changes, some only after the change has begun (Lee, Olsen and Wierwille, *A
 /// Comprehensive Examination of Naturalistic Lane-Changes*, DOT HS 809 702, 2004).
 const SIGNALLING_TIME_S: f64 = 2.0;
+/// Time over which a driver looks along a lane that it enters (s): no driver changes to a lane that
+/// ends within it. Assumption: 5 to 15 are plausible; a lane change takes about 5 s.
+const OPEN_AHEAD_S: f64 = 10.0;
 
 /// Duration of the change back to the original lane after an abort (s): an assumption; 2 to 5 are
 /// plausible.
@@ -173,10 +176,16 @@ impl Step<'_> {
         self.scene.ahead.as_ref().filter(is_meant).or(beyond)
     }
 
+    /// Returns whether a lane stays wide enough for the next [`OPEN_AHEAD_S`].
+    pub(super) fn is_open(&self, lane: Lane) -> bool {
+        let own_m = self.input.own.s_m;
+        self.input.road.is_open(lane, [own_m, own_m + OPEN_AHEAD_S * self.speed_mps])
+    }
+
     /// Returns the perceived lead vehicle in the passing lane, in which the driver is by now. One
     /// reaction time ago that lane may have been the adjacent lane.
     fn lead_in_passing_lane(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        let lane = self.input.road.lane_at(self.input.own.d_m);
+        let lane = self.input.road.lane_of(self.input.own);
         if self.input.road.beside(self.scene.lane, self.side) == Some(lane) {
             self.scene.adjacent(self.side).and_then(|lane| lane.lead.as_ref())
         } else {
@@ -188,7 +197,12 @@ impl Step<'_> {
     /// the first vehicle leaves that lane as well, it is the next vehicle.
     fn overtaken_in(&self, origin: Lane) -> Option<&PerceivedVehicle> {
         let mut leaders = [self.scene.ahead.as_ref(), self.scene.beyond.as_ref()].into_iter().flatten();
-        leaders.find(|leader| self.input.road.lane_at(leader.d_m) == origin)
+        leaders.find(|leader| self.input.road.lane_at(self.ahead_s_m(leader), leader.d_m) == origin)
+    }
+
+    /// Returns about where a vehicle ahead is along the road (m): its rear end.
+    fn ahead_s_m(&self, ahead: &PerceivedVehicle) -> f64 {
+        self.input.own.s_m + 0.5 * self.input.vehicle.dimensions.length_m + ahead.lead.gap_m
     }
 
     /// Returns the present lateral position of the intended path (m).
@@ -198,7 +212,7 @@ impl Step<'_> {
 
     /// Returns the lateral distance from the intended path to the centre of `target` (m).
     fn lateral_distance_m(&self, target: Lane) -> f64 {
-        (self.input.road.lane_centre_m(target) - self.path_d_m()).abs()
+        (self.input.road.lane_centre_m(target, self.input.own.s_m) - self.path_d_m()).abs()
     }
 
     /// Plans a lane change from the present position to `target`, past the vehicle `ahead`.
@@ -229,9 +243,11 @@ impl Step<'_> {
     /// marking.
     fn crossing_at(&self, change: &Change) -> f64 {
         let road = self.input.road;
-        let middle_m = 0.5 * (road.lane_centre_m(change.origin) + road.lane_centre_m(change.target));
+        let [own_m, target_m] = [change.origin, change.target].map(|lane| road.lane_centre_m(lane, change.start_s_m));
+        let middle_m = 0.5 * (own_m + target_m);
         // The marking lies beyond the middle between the centres if the lane of origin is wider.
-        let beyond_m = 0.25 * (road.lane_width_m(change.origin) - road.lane_width_m(change.target));
+        let [own_m, target_m] = [change.origin, change.target].map(|lane| road.lane_width_m(lane, change.start_s_m));
+        let beyond_m = 0.25 * (own_m - target_m);
         path::longitudinal_share((self.lateral_from_start_m(change, middle_m) + beyond_m) / change.lateral_distance_m)
     }
 
@@ -250,8 +266,8 @@ impl OvertakerDriver {
     /// Keeps the speed and pulls out in time, if the passing lane is free; follows the vehicle
     /// ahead otherwise.
     fn approach(&mut self, step: &Step<'_>) -> DriverAction {
-        let origin = step.input.road.lane_at(step.input.own.d_m);
-        let target = step.input.road.beside(origin, step.side);
+        let origin = step.input.road.lane_of(step.input.own);
+        let target = step.input.road.beside(origin, step.side).filter(|target| step.is_open(*target));
         let (Some(ahead), Some(target), Some(lane)) =
             (step.scene.ahead.as_ref(), target, step.scene.adjacent(step.side))
         else {
@@ -288,7 +304,7 @@ impl OvertakerDriver {
     /// Continues the lane change to the passing lane, or aborts it.
     fn continue_change(&mut self, step: &Step<'_>, mut change: Change) -> DriverAction {
         let ego = step.input.own;
-        let in_target_lane = step.input.road.lane_at(ego.d_m) == change.target;
+        let in_target_lane = step.input.road.lane_of(ego) == change.target;
         let overtaken = step.overtaken_in(change.origin);
         if let Some(ahead) = overtaken {
             change.overtaken = Some(ahead.actor);

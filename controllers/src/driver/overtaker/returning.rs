@@ -50,8 +50,8 @@ impl OvertakerDriver {
     pub(super) fn drive_on(&mut self, step: &Step<'_>, passing: CompletedPassing) -> DriverAction {
         let mut action = self.cruise(step, step.ahead_except(passing.overtaken));
         let origin_side = step.side.opposite();
-        let own_lane = step.input.road.lane_at(step.input.own.d_m);
-        let origin = step.input.road.beside(own_lane, origin_side);
+        let own_lane = step.input.road.lane_of(step.input.own);
+        let origin = step.input.road.beside(own_lane, origin_side).filter(|origin| step.is_open(*origin));
         let (Some(returns), Some(origin)) = (self.settings.returns, origin) else { return action };
         if step.input.lane_change_target.is_some() || step.input.time < passing.time + returns.after {
             return action;

@@ -55,7 +55,7 @@ impl Observation {
             time: input.time,
             own_s_m: input.own.s_m,
             own_speed_mps: input.own.speed_mps,
-            own_lane: input.road.lane_at(own_d_m),
+            own_lane: input.road.lane_at(input.own.s_m, own_d_m),
             ahead: nearer.map(observe),
             beyond: near.beyond.as_ref().filter(|beyond| nearer.is_none_or(|ahead| shows(ahead, beyond))).map(observe),
             side,

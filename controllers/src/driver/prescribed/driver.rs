@@ -62,7 +62,7 @@ impl PrescribedDriver {
     fn lane_change(&mut self, input: &DriverInput<'_>) -> Option<LaneChange> {
         let change = *self.profile.lane_changes.get(self.next_change).filter(|change| input.time >= change.at)?;
         self.next_change += 1;
-        let target = input.road.beside(input.road.lane_at(input.own.d_m), change.to)?;
+        let target = input.road.beside(input.road.lane_of(input.own), change.to)?;
         self.change_indicator = Indicator::towards(change.to);
         Some(LaneChange { target, duration_s: change.duration_s })
     }

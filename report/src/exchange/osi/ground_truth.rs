@@ -104,7 +104,7 @@ pub(super) fn base(road: &Road, vehicle: &Vehicle, moving: &Moving) -> BaseMovin
 
 fn moving_object(scenario: &Scenario, index: usize, vehicle: &Vehicle, moving: &Moving) -> MovingObject {
     const TYPE_VEHICLE: i32 = 2;
-    let lane = lane_id(scenario.road.lane_at(moving.state.d_m));
+    let lane = lane_id(scenario.road.lane_of(&moving.state));
     let half_m = 0.5 * vehicle.dimensions.wheelbase_m();
     let down_m = WHEEL_RADIUS_M - 0.5 * vehicle.dimensions.height_m;
     MovingObject {
@@ -170,7 +170,7 @@ fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<m
         });
         points.collect()
     };
-    let host = step.vehicles.get(scenario.ego).map(|moving| road.lane_at(moving.state.d_m));
+    let host = step.vehicles.get(scenario.ego).map(|moving| road.lane_of(&moving.state));
     let boundary_id = |number: u8| identifier(FIRST_BOUNDARY + u64::from(number));
     let lanes = (1..=road.lanes()).map(|number| {
         let lane = Lane(number);
@@ -180,7 +180,7 @@ fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<m
             classification: Some(LaneClassification {
                 r#type: Some(TYPE_DRIVING),
                 is_host_vehicle_lane: Some(host == Some(lane)),
-                centerline: line(&|_| road.lane_centre_m(lane)),
+                centerline: line(&|s_m| road.lane_centre_m(lane, s_m)),
                 centerline_is_driving_direction: Some(true),
                 left_adjacent_lane_id: beside(closecall_traffic::Side::Left),
                 right_adjacent_lane_id: beside(closecall_traffic::Side::Right),

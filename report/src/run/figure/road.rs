@@ -17,7 +17,9 @@ pub(super) fn road(film: &Film, vehicles: &Markup) -> Markup {
     let right_m = -film.road.right_edge_m() * STRETCH;
     let [rear_m, front_m] = REACH_M;
     let view = format!("{rear_m} {:.1} {} {:.1}", -ROOM_M, front_m - rear_m, right_m + 2.0 * ROOM_M);
-    let lines = (1..film.road.lanes()).map(|line| -film.road.boundary_m(line) * STRETCH);
+    // The picture moves with the ego: lanes whose widths change have no place in it.
+    let count = if film.road.has_changing_lanes() { 1 } else { film.road.lanes() };
+    let lines = (1..count).map(|line| -film.road.full_boundary_m(line, 0.0) * STRETCH);
     html! {
         svg viewBox=(view) role="img" aria-label={ "The road from above, " (film.arm_label()) } {
             rect x=(rear_m) y="0" width=(front_m - rear_m) height=(format!("{right_m:.1}")) fill="#e9eaec" {}

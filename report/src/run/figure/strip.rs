@@ -1,6 +1,6 @@
 //! A road strip: the road from above at one instant, in a frame that moves with the ego.
 
-use closecall_traffic::{AccelerationLane, Measured, VehicleState, maths};
+use closecall_traffic::{Measured, VehicleState, maths};
 
 use super::chart::tick_text;
 use super::colours::colour;
@@ -113,12 +113,14 @@ impl Strip<'_> {
         let own_m = self.frame.states[self.film.ego].s_m;
         let ends = [own_m + self.reach[0], own_m + self.reach[1]];
         for lane in 1..road.lanes() {
-            let d_m = road.boundary_m(lane);
-            let stroke = Stroke { colour: MARKING, width: 1.0, dash: Some(DASH) };
-            svg.line(self.at(ends[0], d_m), self.at(ends[1], d_m), stroke);
+            let stretches_m = if road.has_changing_lanes() { road.stretches_m(ends) } else { vec![ends] };
+            for stretch_m in stretches_m {
+                let [from, to] = stretch_m.map(|s_m| self.at(s_m, road.full_boundary_m(lane, s_m)));
+                svg.line(from, to, Stroke { colour: MARKING, width: 1.0, dash: Some(DASH) });
+            }
         }
         for edge in [0, road.lanes()] {
-            for stretch_m in AccelerationLane::stretches_m(road.acceleration_lane(), ends) {
+            for stretch_m in road.stretches_m(ends) {
                 let [from, to] = stretch_m.map(|s_m| self.at(s_m, road.boundary_at_m(edge, s_m)));
                 svg.line(from, to, Stroke::solid(MARKING, 2.5));
             }

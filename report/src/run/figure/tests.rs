@@ -161,7 +161,7 @@ fn a_vehicle_in_the_left_lane_has_its_label_beside_it_if_there_is_room_nowhere_e
     let [rear, lead] =
         [Part::Rear, Part::Lead].map(|part| film.actors.iter().position(|actor| actor.part == part).unwrap());
     let ego = film.frames[0].states[film.ego];
-    let left_m = film.road.lane_centre_m(closecall_traffic::Lane(1));
+    let left_m = film.road.lane_centre_m(closecall_traffic::Lane(1), 0.0);
     let states = &mut film.frames[0].states;
     (states[lead].s_m, states[rear].s_m, states[rear].d_m) = (ego.s_m + 20.0, ego.s_m + 24.0, left_m);
     let mut svg = svg::Svg::new([360.0, 120.0]);

@@ -45,7 +45,7 @@ impl EncounterComparison {
     /// same indices in the simulated film as in the encounter.
     pub fn new(encounter: &RecordedEncounter, recorded: &Film, simulated: &Film) -> Self {
         let from_lane = encounter.home;
-        let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR_INDEX].d_m) != from_lane;
+        let crosses = |frame: &&Frame| simulated.road.lane_of(&frame.states[REAR_INDEX]) != from_lane;
         let crossing = simulated.frames.iter().find(crosses).map(|frame| frame.time);
         Self {
             recorded: EncounterMetrics::measure(recorded, Some(encounter.crossing)),

@@ -79,7 +79,7 @@ impl FilmRecorder {
             has_mis: stack(scenario).is_some_and(|stack| stack.mis().is_some()),
             level,
             period: CONTROL_STEP,
-            road: scenario.road,
+            road: scenario.road.clone(),
             environment: scenario.environment,
             actors: scenario.actors.iter().enumerate().map(film_actor).collect(),
             ego: scenario.ego,

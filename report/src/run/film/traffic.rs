@@ -237,6 +237,7 @@ pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, Config
         lanes,
         lane_width_m: lane_width_m.clamp(LANE_WIDTH_RANGE_M[0], LANE_WIDTH_RANGE_M[1]).into(),
         curvature_per_m: Num::Fixed(0.0),
+        cross_sections: Vec::new(),
         alignment: Vec::new(),
         alignment_d_m: None,
         speed_limit_mps: Num::Fixed(SPEED_LIMIT_MPS),

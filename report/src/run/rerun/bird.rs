@@ -164,7 +164,7 @@ fn label_scale(roads_m: &[f64], height_px: f64) -> f64 {
 
 pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
     let times = canvas.film.times();
-    write_lanes(writer, canvas)?;
+    write_lanes(writer, canvas, &times)?;
     if canvas.has_axis {
         write_axis(writer, canvas)?;
     }
@@ -178,19 +178,42 @@ pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
     write_collisions(writer, canvas)
 }
 
-/// Writes the edges of the road and the lane markings.
-fn write_lanes(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
+/// Writes the edges of the road and the lane markings. If the widths of the lanes change, they move
+/// past the ego.
+fn write_lanes(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
     let road = &canvas.film.road;
-    let lines = (0..=road.lanes()).map(|line| road.boundary_m(line));
     // A drawing of wide roads shows more than the stretch that is meant.
-    let strips = lines.map(|d_m| {
-        let y = (canvas.top_m - d_m * STRETCH) as f32;
-        X_RANGE_M.map(|x_m| [8.0 * x_m as f32, y])
+    let reach_m = X_RANGE_M.map(|x_m| 8.0 * x_m);
+    let strips = (0..=road.lanes()).map(|line| {
+        let y = (canvas.top_m - road.full_boundary_m(line, 0.0) * STRETCH) as f32;
+        reach_m.map(|x_m| [x_m as f32, y])
     });
     let edge = |line: u8| line == 0 || line == road.lanes();
     let colours = (0..=road.lanes()).map(|line| if edge(line) { palette::MARKING } else { palette::QUIET });
     let lanes = LineStrips2D::new(strips).with_colors(colours).with_radii([0.12_f32]).with_draw_order(LANE_ORDER);
-    writer.write_static("bird/lanes", &lanes)
+    if !road.has_changing_lanes() {
+        return writer.write_static("bird/lanes", &lanes);
+    }
+    let fixed = LineStrips2D { strips: None, ..lanes };
+    writer.write_static("bird/lanes", &fixed)?;
+    let strips = |frame: &Frame| {
+        let ego_m = frame.states[canvas.film.ego].s_m;
+        let [from_m, to_m] = reach_m.map(|x_m| ego_m + x_m);
+        let mut along_m: Vec<f64> = road.stretches_m([from_m, to_m]).iter().map(|[start_m, _]| *start_m).collect();
+        along_m.push(to_m);
+        let strip = |line: u8| -> Vec<[f32; 2]> {
+            along_m.iter().map(|s_m| canvas.at(frame, *s_m, road.full_boundary_m(line, *s_m))).collect()
+        };
+        (0..=road.lanes()).map(strip).collect::<Vec<_>>()
+    };
+    writer.write_rows("bird/lanes", times, |range| {
+        let frames = &canvas.film.frames[range];
+        LineStrips2D::update_fields().with_strips(frames.iter().flat_map(strips)).columns(vec![
+            usize::from(road.lanes())
+                + 1;
+            frames.len()
+        ])
+    })
 }
 
 /// Writes the metre axis below the road.

@@ -1,6 +1,6 @@
 //! The road in the 3D scene: surface, lane markings, guard rails. It is written once per film.
 
-use closecall_traffic::{AccelerationLane, Road, Side};
+use closecall_traffic::{Road, Side};
 use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordingError;
@@ -74,14 +74,14 @@ fn markings(road: &Road, [from_m, to_m]: [f64; 2]) -> Ribbons<'_> {
     let mut markings = Ribbons::new(road, MARKING_Z_M);
     let around = |d_m: f64, width_m: f64| [d_m - 0.5 * width_m, d_m + 0.5 * width_m];
     for edge in [0, road.lanes()] {
-        for along_m in AccelerationLane::stretches_m(road.acceleration_lane(), [from_m, to_m]) {
+        for along_m in road.stretches_m([from_m, to_m]) {
             markings.add_along(along_m, |s_m| around(road.boundary_at_m(edge, s_m), EDGE_WIDTH_M));
         }
     }
     for lane in 1..road.lanes() {
-        let line_m = road.boundary_m(lane);
         for dash in multiples(DASH_PERIOD_M, [from_m, to_m]) {
-            markings.add([dash, dash + DASH_M], around(line_m, DASH_WIDTH_M));
+            let line = |s_m| around(road.full_boundary_m(lane, s_m), DASH_WIDTH_M);
+            markings.add_along([dash, dash + DASH_M], line);
         }
     }
     // No vehicle leaves the ramp before the acceleration lane begins.
@@ -90,8 +90,9 @@ fn markings(road: &Road, [from_m, to_m]: [f64; 2]) -> Ribbons<'_> {
             Side::Left => road.lanes() - 1,
             Side::Right => 1,
         };
-        let line_m = road.boundary_at_m(inner, from_m);
-        markings.add([from_m, lane.from_m.min(to_m)], around(line_m, DASH_WIDTH_M));
+        for along_m in road.stretches_m([from_m, lane.from_m.min(to_m)]) {
+            markings.add_along(along_m, |s_m| around(road.boundary_at_m(inner, s_m), DASH_WIDTH_M));
+        }
     }
     markings
 }

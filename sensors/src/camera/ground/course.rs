@@ -119,7 +119,7 @@ mod tests {
         let points = [[-150.0, 0.0], [-50.0, 0.004], [20.0, 0.004], [80.0, -0.002]];
         let points = points.map(|[s_m, curvature_per_m]| AlignmentPoint { s_m, curvature_per_m });
         let beside = Road::straight(3).with_alignment_at(Alignment::new(&points).unwrap(), 2.75);
-        for road in [road(), road().reversed(), beside, beside.reversed()] {
+        for road in [road(), road().reversed(), beside.clone(), beside.reversed()] {
             for lens_s_m in [-120.0, -20.0, 60.0, 150.0] {
                 let lens = VehicleState { s_m: lens_s_m, d_m: -5.6, ..VehicleState::default() };
                 let frame = EgoFrame::new(&road, &lens);

@@ -148,7 +148,7 @@ impl Ground {
     #[inline]
     fn paint_shares(&self, s: f32x4, d: f32x4, row: &GroundRow) -> f32x4 {
         let [none_of_it, whole] = [splat(0.0), splat(1.0)];
-        let (off, is_edge) = self.lanes.nearest_markings(d);
+        let (off, is_edge) = self.lanes.nearest_markings(s - splat(self.s_m), d);
         let is_near = off.simd_lt(splat(EDGE_LINE_HALF_M));
         if none(is_near) {
             return none_of_it;
@@ -164,7 +164,7 @@ impl Ground {
 impl GroundLanes {
     /// See [`GroundLanes::nearest_marking`].
     #[inline]
-    fn nearest_markings(&self, d: f32x4) -> (f32x4, f32x4) {
+    fn nearest_markings(&self, ahead: f32x4, d: f32x4) -> (f32x4, f32x4) {
         match self {
             Self::Equal { width_m, lanes } => {
                 let (first, last) = (splat(0.0), splat(*lanes));
@@ -183,6 +183,12 @@ impl GroundLanes {
                     nearest = (is_nearer.select(off, nearest.0), is_nearer.select(is_edge, nearest.1));
                 }
                 nearest
+            }
+            Self::Along { .. } => {
+                let (ahead, d) = (ahead.to_array(), d.to_array());
+                let at: [(f32, bool); 4] = std::array::from_fn(|moment| self.nearest_marking(ahead[moment], d[moment]));
+                let is_edge = f32x4::from(at.map(|(_, is_edge)| f32::from(u8::from(is_edge))));
+                (f32x4::from(at.map(|(off, _)| off)), is_edge.simd_eq(splat(1.0)))
             }
         }
     }
@@ -253,18 +259,56 @@ fn headlamp_beam(ahead: f32x4, left: f32x4) -> f32x4 {
 mod tests {
     use closecall_traffic::Road;
 
+    use super::super::PLACE_EVERY_M;
     use super::*;
+
+    /// The left lane begins between 20 and 100 m, and the right one becomes wider.
+    fn changing() -> Road {
+        let sections = [(20.0, -3.0, vec![0.0, 3.5, 3.25]), (100.0, 0.0, vec![3.0, 3.5, 4.0])];
+        Road::straight(3).with_cross_sections(&sections)
+    }
+
+    #[test]
+    fn the_markings_of_lanes_that_change_are_where_the_lanes_are() {
+        for (road, lens_m) in [(changing(), 50.0), (changing().reversed(), -50.0)] {
+            let lanes = GroundLanes::new(&road, lens_m);
+            for index in 0..600_u16 {
+                let ahead = 0.5 * (f32::from(index) - 300.0);
+                let s_m = lens_m + f64::from(ahead);
+                // A kink between two places is rounded off.
+                if road.cross_sections_m().any(|kink_m| (kink_m - s_m).abs() < f64::from(PLACE_EVERY_M)) {
+                    continue;
+                }
+                let markings = [0, 1, 2, 3].map(|number| road.full_boundary_m(number, s_m) as f32);
+                for marking_m in markings {
+                    let (off, is_edge) = lanes.nearest_marking(ahead, marking_m);
+                    let at_edge = [markings[0], markings[3]].iter().any(|edge_m| (edge_m - marking_m).abs() < 1e-4);
+                    assert!(off < 1e-3 && is_edge == at_edge, "{marking_m} at {ahead}: {off} {is_edge}");
+                }
+            }
+            let ahead: [f32; 4] = [-31.0, -7.5, 20.0, 49.0];
+            for index in 0..300_u16 {
+                let d: [f32; 4] = std::array::from_fn(|moment| 2.0 - 0.05 * f32::from(index) - 0.013 * moment as f32);
+                let (off, is_edge) = lanes.nearest_markings(ahead.into(), d.into());
+                let is_edge = is_edge.select(splat(1.0), splat(0.0)).to_array();
+                for moment in 0..4 {
+                    let expected = lanes.nearest_marking(ahead[moment], d[moment]);
+                    assert_eq!((off.to_array()[moment], is_edge[moment] == 1.0), expected, "{ahead:?} {d:?}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn the_markings_at_four_moments_are_the_markings_at_each() {
         for widths_m in [&[3.75, 3.75, 3.75][..], &[3.25, 3.5, 4.0], &[2.5, 5.0]] {
-            let lanes = GroundLanes::new(&Road::straight(1).with_lane_widths(widths_m));
+            let lanes = GroundLanes::new(&Road::straight(1).with_lane_widths(widths_m), 0.0);
             for index in 0..300_u16 {
                 let d: [f32; 4] = std::array::from_fn(|moment| 2.0 - 0.05 * f32::from(index) - 0.013 * moment as f32);
-                let (off, is_edge) = lanes.nearest_markings(d.into());
+                let (off, is_edge) = lanes.nearest_markings(splat(0.0), d.into());
                 let is_edge = is_edge.select(splat(1.0), splat(0.0)).to_array();
                 for (moment, d) in d.into_iter().enumerate() {
-                    let (expected, at_edge) = lanes.nearest_marking(d);
+                    let (expected, at_edge) = lanes.nearest_marking(0.0, d);
                     assert_eq!(
                         (off.to_array()[moment], is_edge[moment] == 1.0),
                         (expected, at_edge),

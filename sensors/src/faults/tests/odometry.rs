@@ -78,17 +78,17 @@ fn an_ego_keeps_its_place_between_the_markings_of_a_map_with_other_widths() {
     let road = Road::straight(3).with_lane_widths(&[3.0, 3.5, 4.0]);
     let wide = errors("lane-width-m = 0.5");
     let map = wide.map_of(&road);
-    assert_eq!(map.lane_widths_m().collect::<Vec<_>>(), [3.5, 4.0, 4.5]);
+    assert_eq!(map.lane_widths_m(0.0).collect::<Vec<_>>(), [3.5, 4.0, 4.5]);
     // At the edges, at the centre and a quarter of the way through the lanes.
     for (d_m, on_map_m) in [(0.0, 0.0), (-3.0, -3.5), (-4.75, -5.5), (-7.5, -8.625), (-10.5, -12.0)] {
-        let own_d_m = wide.own_d_m(&road, d_m);
+        let own_d_m = wide.own_d_m(&road, 0.0, d_m);
         assert!((own_d_m - on_map_m).abs() < 1e-12, "{d_m}: {own_d_m}");
     }
     let lateral = errors("lateral-m = 0.25");
-    assert_eq!((lateral.map_of(&road), lateral.own_d_m(&road, -4.75)), (road, -4.5));
+    assert_eq!((lateral.map_of(&road), lateral.own_d_m(&road, 0.0, -4.75)), (road.clone(), -4.5));
     // A width beyond the range of a road is at its end.
     let narrow = errors("lane-width-m = -1.0").map_of(&road);
-    assert_eq!(narrow.lane_widths_m().collect::<Vec<_>>(), [2.5, 2.5, 3.0]);
+    assert_eq!(narrow.lane_widths_m(0.0).collect::<Vec<_>>(), [2.5, 2.5, 3.0]);
 }
 
 #[test]

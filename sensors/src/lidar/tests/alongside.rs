@@ -90,7 +90,7 @@ fn a_sensor_sees_the_retro_reflective_face_only_from_the_side_of_the_traffic() {
         let mut setup = TestScene::new();
         let (s_m, d_m) = (1_000.0, -9.4);
         (setup.ego.state.s_m, setup.ego.state.d_m) = if road.is_reversed() { (-s_m, -11.25 - d_m) } else { (s_m, d_m) };
-        setup.road = road;
+        setup.road = road.clone();
         let mut lidar = RearLidar::new(Lidar::default());
         setup.detect(&mut lidar, 0);
         let returns_from = |material| lidar.truth().points.iter().filter(|point| point.material == material).count();
@@ -99,7 +99,7 @@ fn a_sensor_sees_the_retro_reflective_face_only_from_the_side_of_the_traffic() {
     let signs = road("roadside.sign-spacing-m = 25");
     // The rear sensor looks at the backs of the signs that the ego has passed; the front sensor,
     // whose road is turned, at the faces.
-    let [rear, front] = [materials(signs), materials(signs.reversed())];
+    let [rear, front] = [materials(signs.clone()), materials(signs.reversed())];
     assert!(rear[0] < rear[1] && front[0] > 5 * rear[0].max(1), "{rear:?} {front:?}");
 }
 

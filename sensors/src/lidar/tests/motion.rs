@@ -31,7 +31,7 @@ fn boxes_on_a_clothoid_lie_where_the_vehicle_is() {
     let road = course(&[[920.0, -0.002], [990.0, 0.002]]);
     for gap_m in [25.0, 60.0] {
         let mut setup = TestScene::new().with(VehicleClass::Car, gap_m, 0.0);
-        setup.road = road;
+        setup.road = road.clone();
         let mut lidar = RearLidar::new(Lidar::default());
         let detections = setup.detect(&mut lidar, 0);
         assert_eq!(detections.len(), 1, "{gap_m}");
@@ -51,7 +51,7 @@ fn boxes_on_a_clothoid_lie_where_the_vehicle_is() {
 fn points_of_guard_rails_lie_on_the_rails_of_an_s_curve() {
     let road = course(&[[960.0, -0.0025], [990.0, 0.0025]]).with_guard_rails();
     let mut setup = TestScene::new();
-    setup.road = road;
+    setup.road = road.clone();
     let mut lidar = RearLidar::new(Lidar::default());
     setup.detect(&mut lidar, 0);
     let complete = lidar.completed().unwrap();

@@ -132,7 +132,7 @@ fn guard_rails_give_returns_but_no_vehicle_detections() {
     let course = Road::straight(3).with_alignment(Alignment::new(&points).unwrap()).with_guard_rails();
     for road in [0.0, 0.0025, -0.0025].map(road_with_guard_rails).into_iter().chain([course]) {
         let mut setup = TestScene::new().with(VehicleClass::Car, 30.0, 0.0).with(VehicleClass::Car, 20.0, -3.75);
-        setup.road = road;
+        setup.road = road.clone();
         let mut lidar = RearLidar::new(Lidar::default());
         for scan_index in 0..2 {
             let detections = setup.detect(&mut lidar, scan_index);

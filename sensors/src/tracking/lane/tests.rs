@@ -24,7 +24,7 @@ fn errors(road: &Road, state: &VehicleState) -> [f64; 2] {
 fn the_path_along_clothoids_is_the_line_of_the_ego_on_the_road() {
     // The shortest clothoid of a motorway, and an inflection.
     let s_curve = alignment(&[[0.0, 0.0], [20.0, 0.0025], [100.0, 0.0025], [145.0, -0.002], [300.0, -0.002]]);
-    for road in [s_curve, s_curve.reversed()] {
+    for road in [s_curve.clone(), s_curve.reversed()] {
         for place in [30.0, 90.0, 130.0, 200.0, 290.0] {
             let s_m = if road.is_reversed() { -place } else { place };
             for heading_rad in [0.0, 0.05] {

@@ -159,6 +159,26 @@ fn a_reversed_road_has_the_same_places() {
 }
 
 #[test]
+fn a_line_of_a_thousand_points_is_as_exact_as_a_short_one() {
+    let points: Vec<[f64; 2]> =
+        (0..1_000).map(|index| [f64::from(index) * 10.0, 0.003 * maths::sin(0.05 * f64::from(index))]).collect();
+    let line = alignment(&points);
+    assert_eq!(line.points().len(), 1_000);
+    // A part of it is the line of that part.
+    let part = alignment(&points[500..540]);
+    for (from_m, to_m) in [(5_010.0, 5_300.0), (5_333.0, 5_120.0)] {
+        assert_eq!(line.displacement(from_m, to_m), part.displacement(from_m, to_m));
+    }
+    let [x_m, y_m, turn_rad] = marched(&line, 0.0, 9_000.0);
+    let pose = line.pose(9_000.0);
+    assert!((pose.x_m - x_m).abs() < 1e-3 && (pose.y_m - y_m).abs() < 1e-3, "{pose:?} {x_m} {y_m}");
+    assert!((pose.yaw_rad - turn_rad).abs() < 1e-6);
+    let road = Road::straight(2).with_alignment(line);
+    let back = road.reversed().reversed();
+    assert_eq!(back.alignment(), road.alignment());
+}
+
+#[test]
 fn points_that_are_no_alignment_are_refused_by_their_key() {
     let refused = |points: &[[f64; 2]]| {
         let points: Vec<_> =
@@ -166,9 +186,9 @@ fn points_that_are_no_alignment_are_refused_by_their_key() {
         Alignment::new(&points).map(|_| ()).unwrap_err().to_string()
     };
     for (points, words) in [
-        (vec![], "`alignment` has 0 entries, but 2 to 64 are allowed"),
-        (vec![[0.0, 0.0]], "`alignment` has 1 entry, but 2 to 64 are allowed"),
-        (vec![[0.0, 0.0]; 65], "`alignment` has 65 entries,"),
+        (vec![], "`alignment` has 0 entries, but 2 to 4096 are allowed"),
+        (vec![[0.0, 0.0]], "`alignment` has 1 entry, but 2 to 4096 are allowed"),
+        (vec![[0.0, 0.0]; 4_097], "`alignment` has 4097 entries,"),
         (
             vec![[0.0, 0.0], [100.0, 0.0041]],
             "`alignment[1].curvature-per-m` is 0.0041, but a number from -0.004 to 0.004",

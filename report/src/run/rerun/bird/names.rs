@@ -54,7 +54,7 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
     let film = canvas.film;
     let frame = &film.frames[row];
     let ego = &frame.states[film.ego];
-    let own_lane_m = film.road.lane_width_m(film.road.lane_at(ego.d_m));
+    let own_lane_m = film.road.lane_width_m(film.road.lane_of(ego), ego.s_m);
     let labelled_m = canvas.labelled_m();
     // A headway after a collision says nothing, and its room is taken by the text of the collision.
     let has_collided = film.worst_collision().is_some_and(|collision| frame.time >= collision.time);
