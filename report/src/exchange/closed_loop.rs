@@ -143,7 +143,9 @@ impl Writer<'_> {
                     _ => actor.start.s_m.into(),
                 };
                 let lane = self.scenario.road.lane_of(&actor.start);
-                let offset_m = actor.start.d_m - self.scenario.road.lane_centre_m(lane, actor.start.s_m);
+                // The line that a driver in the lane follows passes a kink of the lane beside its centre.
+                let [line_m, ..] = self.scenario.road.driving_line(lane, actor.start.s_m);
+                let offset_m = actor.start.d_m - line_m;
                 Element::new("LanePosition")
                     .with("roadId", 1)
                     .with("laneId", format!("-{lane}"))

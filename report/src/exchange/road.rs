@@ -19,6 +19,9 @@ use closecall_traffic::{AccelerationLane, AlignmentPiece, Lane, Road, Side};
 use super::element::Element;
 use crate::date::today;
 
+/// Difference of two coefficients of polynomials that are the same: numerical.
+const SAME: f64 = 1e-12;
+
 /// Length of the road before the first and behind the last position that is used (m): a player
 /// looks ahead.
 const MARGIN_M: f64 = 500.0;
@@ -170,9 +173,8 @@ impl<'a> UsedRoad<'a> {
     fn widths(&self, section: &Section, lane: Lane) -> Vec<Element> {
         let section_m = self.start_m + section.from_m;
         let narrowing = self.narrowing_lane().filter(|_| section.is_taper && lane.0 == section.lanes);
-        let width = |[from_m, to_m]: [f64; 2]| {
+        let polynomial = |[from_m, to_m]: [f64; 2]| {
             let [full_m, end_m] = [from_m, to_m].map(|s_m| self.road.lane_width_m(lane, s_m));
-            let width = Element::new("width").with("sOffset", from_m - section_m);
             let slope = (end_m - full_m) / (to_m - from_m);
             // The product of the share and the width is a polynomial of second degree.
             let [a, b, c] = match narrowing {
@@ -186,9 +188,14 @@ impl<'a> UsedRoad<'a> {
                 }
                 None => [full_m, slope, 0.0],
             };
-            width.with("a", a).with("b", b).with("c", c).with("d", 0)
+            Polynomial { from_m, a, b, c }
         };
-        self.stretches_m(section).into_iter().map(width).collect()
+        let polynomials = without_repetitions(self.stretches_m(section).into_iter().map(polynomial));
+        let element = |polynomial: Polynomial| {
+            let width = Element::new("width").with("sOffset", polynomial.from_m - section_m).with("a", polynomial.a);
+            width.with("b", polynomial.b).with("c", polynomial.c).with("d", 0)
+        };
+        polynomials.into_iter().map(element).collect()
     }
 
     /// Returns the stretches of a section on which each boundary of the lanes is a line (m).
@@ -211,16 +218,14 @@ impl<'a> UsedRoad<'a> {
         if !self.road.has_changing_lanes() {
             return (beside_m != 0.0).then(|| offset(self.start_m, -beside_m, 0.0)).into_iter().collect();
         }
-        let of_stretch = |[from_m, to_m]: [f64; 2]| {
+        let polynomial = |[from_m, to_m]: [f64; 2]| {
             let [left_m, end_m] = [from_m, to_m].map(|s_m| self.road.full_boundary_m(0, s_m));
-            (from_m, left_m - beside_m, (end_m - left_m) / (to_m - from_m))
+            Polynomial { from_m, a: left_m - beside_m, b: (end_m - left_m) / (to_m - from_m), c: 0.0 }
         };
-        let mut offsets: Vec<(f64, f64, f64)> =
-            self.road.stretches_m(self.range_m()).into_iter().map(of_stretch).collect();
-        offsets.dedup_by(|next, before| next.2 == 0.0 && before.2 == 0.0 && next.1 == before.1);
-        let is_zero = offsets.iter().all(|(_, offset_m, slope)| *offset_m == 0.0 && *slope == 0.0);
+        let offsets = without_repetitions(self.road.stretches_m(self.range_m()).into_iter().map(polynomial));
+        let is_zero = offsets.iter().all(|Polynomial { a, b, .. }| [*a, *b] == [0.0; 2]);
         let offsets = offsets.into_iter().filter(|_| !is_zero);
-        offsets.map(|(from_m, offset_m, slope)| offset(from_m, offset_m, slope)).collect()
+        offsets.map(|Polynomial { from_m, a, b, .. }| offset(from_m, a, b)).collect()
     }
 
     /// Returns the markings to the right of a lane.
@@ -240,6 +245,34 @@ impl<'a> UsedRoad<'a> {
             true => vec![marking("solid", 0.0)],
         }
     }
+}
+
+/// A polynomial of second degree of the distance from a position (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Polynomial {
+    from_m: f64,
+    a: f64,
+    b: f64,
+    c: f64,
+}
+
+impl Polynomial {
+    /// Returns whether `next` is the same line.
+    fn goes_on_as(&self, next: &Self) -> bool {
+        let at_next_m = self.a + self.b * (next.from_m - self.from_m);
+        [self.c, next.c] == [0.0; 2] && (self.b - next.b).abs() < SAME && (at_next_m - next.a).abs() < SAME
+    }
+}
+
+/// Returns the polynomials without those that go on as the polynomial before them.
+fn without_repetitions(polynomials: impl Iterator<Item = Polynomial>) -> Vec<Polynomial> {
+    let mut different: Vec<Polynomial> = Vec::new();
+    for polynomial in polynomials {
+        if !different.last().is_some_and(|before| before.goes_on_as(&polynomial)) {
+            different.push(polynomial);
+        }
+    }
+    different
 }
 
 /// A stretch of the road with the same lanes.
