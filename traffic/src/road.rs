@@ -204,8 +204,9 @@ impl Check for RoadConfig {
             let rule = "it is the place of the alignment, and the road has none".to_owned();
             return Err(ConfigError::new("alignment-d-m", Problem::Contradiction { other: "alignment", rule }));
         }
+        let each = self.lane_width_m.check(self.lanes, parameters)?;
         let widths = match self.cross_sections.is_empty() {
-            true => self.lane_width_m.check(self.lanes, parameters)?,
+            true => each,
             false if self.lane_width_m != default_lane_width() => {
                 let rule = "each lane has one width, or the road has cross-sections: one of both".to_owned();
                 return Err(ConfigError::new("lane-width-m", Problem::Contradiction { other: "cross-sections", rule }));
@@ -655,8 +656,8 @@ impl Road {
         }
     }
 
-    /// Returns true if a lane has room for vehicles between two positions (m), of which the first one
-    /// is the smaller one: 2.5 m or more. The lanes of a road have it unless their widths change.
+    /// Returns true if a lane has room for vehicles from a position to one behind it (m): 2.5 m or
+    /// more. The lanes of a road have it unless their widths change.
     pub fn is_open(&self, lane: Lane, [from_m, to_m]: [f64; 2]) -> bool {
         let LaneWidths::Along(along) = &self.widths else { return true };
         let is_wide = |s_m: f64| along.width_m(lane.0, s_m) >= Self::LANE_WIDTH_M.low();

@@ -718,7 +718,7 @@ mod tests {
             imported(&[&[lane(driving, "driving", narrow), lane(at, "none", widths)]])
         };
         assert_eq!(beside(-2, widens), Ok(vec![]));
-        let steep = "<width a=\"3\"/><width sOffset=\"50\" a=\"3\" b=\"0.2\"/>";
+        let steep = "<width a=\"3\"/><width sOffset=\"50\" a=\"3\" b=\"0.2\"/><width sOffset=\"60\" a=\"5\"/>";
         let too_steep = "a boundary moves sideways by 0.200 m in each metre at 50 m, and 0.15 m are allowed";
         assert_eq!(beside(-1, steep), note(too_steep));
         let border = beside(-1, "<border a=\"-2\"/>").unwrap_err();

@@ -552,7 +552,10 @@ mod tests {
             }
         }
         let mirrored = road().mirrored().unwrap();
-        assert_eq!([0, 1, 2, 3].map(|number| mirrored.full_boundary_m(number, 350.0)), [-1.75, -3.5, -7.25, -10.75]);
+        for (number, expected_m) in [(0, -1.75), (1, -3.5), (2, -7.25), (3, -10.75)] {
+            let edge_m = mirrored.full_boundary_m(number, 350.0);
+            assert!((edge_m - expected_m).abs() < 1e-12, "{number}: {edge_m}");
+        }
         assert_eq!(mirrored.beside(Lane(1), Side::Right), Some(Lane(2)));
     }
 
