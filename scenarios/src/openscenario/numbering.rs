@@ -103,7 +103,7 @@ mod tests {
     use super::super::entry_lane;
     use super::*;
 
-    /// Reads sections of lanes: the number of each, and those of its predecessor and successor, or 0.
+    /// Reads sections of lanes: the number of each, of its predecessor and of its successor, or 0.
     fn read(sections: &[&[[i32; 3]]]) -> Option<Vec<Vec<[i32; 2]>>> {
         let link = |name: &str, id: i32| if id == 0 { String::new() } else { format!("<{name} id=\"{id}\"/>") };
         let lane = |[id, before, next]: &[i32; 3]| {
