@@ -391,6 +391,7 @@ impl Road {
 
     /// Returns the width of a lane at a position along the road (m). An acceleration lane has its full
     /// width.
+    #[inline]
     pub fn lane_width_m(&self, lane: Lane, s_m: f64) -> f64 {
         self.widths.width_m(lane.0, s_m)
     }
@@ -427,6 +428,7 @@ impl Road {
     }
 
     /// Returns true if the widths of the lanes change along the road.
+    #[inline]
     pub fn has_changing_lanes(&self) -> bool {
         matches!(self.widths, LaneWidths::Along(_))
     }
@@ -440,6 +442,7 @@ impl Road {
     /// Returns the lateral position of a boundary of the lanes at a position along the road (m), with
     /// the full width of an acceleration lane. Boundary 0 is the left edge of lane 1, and boundary n
     /// is the right edge of lane n.
+    #[inline]
     pub fn full_boundary_m(&self, number: u8, s_m: f64) -> f64 {
         self.widths.boundary_m(number, s_m)
     }
@@ -602,6 +605,7 @@ impl Road {
 
     /// Returns the lateral position of the centre of a lane at a position along the road (m), which
     /// is negative.
+    #[inline]
     pub fn lane_centre_m(&self, lane: Lane, s_m: f64) -> f64 {
         self.widths.centre_m(lane.0, s_m)
     }
@@ -627,11 +631,13 @@ impl Road {
     }
 
     /// Returns the lane in which the point (`s_m`, `d_m`) lies; beyond an edge, the lane at that edge.
+    #[inline]
     pub fn lane_at(&self, s_m: f64, d_m: f64) -> Lane {
         Lane(self.widths.lane_at(self.lanes, s_m, d_m))
     }
 
     /// Returns the lane in which a vehicle is; beyond an edge, the lane at that edge.
+    #[inline]
     pub fn lane_of(&self, vehicle: &VehicleState) -> Lane {
         self.lane_at(vehicle.s_m, vehicle.d_m)
     }
@@ -658,6 +664,7 @@ impl Road {
 
     /// Returns true if a lane has room for vehicles from a position to one behind it (m): 2.5 m or
     /// more. The lanes of a road have it unless their widths change.
+    #[inline]
     pub fn is_open(&self, lane: Lane, [from_m, to_m]: [f64; 2]) -> bool {
         let LaneWidths::Along(along) = &self.widths else { return true };
         let is_wide = |s_m: f64| along.width_m(lane.0, s_m) >= Self::LANE_WIDTH_M.low();

@@ -173,16 +173,19 @@ impl CrossSections {
 
     /// Returns the lateral position of the right edge of lane `number` (m), or of the left edge of
     /// lane 1 if it is 0.
+    #[inline(never)]
     pub(super) fn boundary_m(&self, number: u8, s_m: f64) -> f64 {
         self.edge_m(number.into(), s_m)
     }
 
     /// Returns the width of a lane (m).
+    #[inline(never)]
     pub(super) fn width_m(&self, lane: u8, s_m: f64) -> f64 {
         lane.checked_sub(1).map_or(0.0, |left| self.boundary_m(left, s_m) - self.boundary_m(lane, s_m))
     }
 
     /// Returns the lateral position of the centre of a lane (m).
+    #[inline(never)]
     pub(super) fn centre_m(&self, lane: u8, s_m: f64) -> f64 {
         0.5 * (self.boundary_m(lane.saturating_sub(1), s_m) + self.boundary_m(lane, s_m))
     }
@@ -225,6 +228,7 @@ impl CrossSections {
 
     /// Returns the lane of a road of `lanes` lanes in which a lateral position lies; beyond an edge,
     /// the lane at that edge. A lane without a width has no place.
+    #[inline(never)]
     pub(super) fn lane_at(&self, lanes: u8, s_m: f64, d_m: f64) -> u8 {
         let passes = |number: &u8| d_m <= self.boundary_m(*number, s_m);
         let lane = (1..lanes).take_while(passes).last().unwrap_or_default() + 1;

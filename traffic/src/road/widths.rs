@@ -141,6 +141,7 @@ impl LaneWidths {
     }
 
     /// Returns the width of a lane at a position along the road (m).
+    #[inline]
     pub(super) fn width_m(&self, lane: u8, s_m: f64) -> f64 {
         match self {
             Self::Equal(width_m) => *width_m,
@@ -151,6 +152,7 @@ impl LaneWidths {
 
     /// Returns the lateral position of the right edge of lane `number` (m), or of the left edge of
     /// lane 1 if it is 0.
+    #[inline]
     pub(super) fn boundary_m(&self, number: u8, s_m: f64) -> f64 {
         match self {
             Self::Equal(width_m) => -f64::from(number) * width_m,
@@ -168,6 +170,7 @@ impl LaneWidths {
     }
 
     /// Returns the lateral position of the centre of a lane (m).
+    #[inline]
     pub(super) fn centre_m(&self, lane: u8, s_m: f64) -> f64 {
         match self {
             Self::Equal(width_m) => -(f64::from(lane) - 0.5) * width_m,
@@ -178,6 +181,7 @@ impl LaneWidths {
 
     /// Returns the lane of a road of `lanes` lanes in which a lateral position lies; beyond an edge,
     /// the lane at that edge.
+    #[inline]
     pub(super) fn lane_at(&self, lanes: u8, s_m: f64, d_m: f64) -> u8 {
         match self {
             Self::Equal(width_m) => {
