@@ -230,7 +230,7 @@ fn campaign(more: &[&str]) -> Vec<String> {
     let scenario = library("low-thw-overtake");
     let fixed =
         ["campaign", scenario.to_str().unwrap(), "--sensors", "object", "-n", "4", "--seed", "1", "--jobs", "1"];
-    let fixed = fixed.iter().chain(&["--no-gate", "--recordings", "0"]);
+    let fixed = fixed.iter().chain(&["--no-gate", "--no-validity-checks", "--recordings", "0"]);
     fixed.chain(more).map(|argument| (*argument).to_owned()).collect()
 }
 

@@ -54,12 +54,18 @@ pub(crate) fn program() -> Command {
 }
 
 /// Runs the program in the folder of the repository. A campaign that names no folder keeps no
-/// results: they would lie there.
+/// results: they would lie there. One that names no recordings keeps none: they take longer than
+/// small campaigns do.
 pub(crate) fn closecall<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> Output {
     let mut args: Vec<OsString> = args.into_iter().map(|arg| arg.as_ref().to_owned()).collect();
-    let has_place = |arg: &OsString| arg.to_str().is_some_and(|arg| arg == "--out" || arg.starts_with("--out="));
-    if args.first().is_some_and(|command| command == "campaign") && !args.iter().any(has_place) {
-        args.insert(1, "--no-out".into());
+    let names = |option: &str| args.iter().any(|arg| arg.to_str().is_some_and(|arg| arg.starts_with(option)));
+    if args.first().is_some_and(|command| command == "campaign") {
+        let added = match names("--out") {
+            false => &["--no-out"][..],
+            true if names("--record") => &[],
+            true => &["--record", "failures:0"],
+        };
+        args.splice(1..1, added.iter().map(OsString::from));
     }
     program().args(args).output().expect("the program starts")
 }
