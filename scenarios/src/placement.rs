@@ -181,7 +181,7 @@ impl Placement<'_> {
         let d_m = match start.lane {
             Some(lane) => line_m(self.lane(lane, s_m)?, s_m),
             None if self.road.has_changing_lanes() => {
-                let lane = self.road.lane_of(&reference);
+                let lane = self.lane(self.road.lane_of(&reference), s_m)?;
                 reference.d_m + (line_m(lane, s_m) - line_m(lane, reference.s_m))
             }
             None => reference.d_m,
@@ -233,7 +233,7 @@ impl Placement<'_> {
         }
         let [width_m, least_m] = [self.road.lane_width_m(lane, s_m), Road::LANE_WIDTH_M.low()];
         let rule = format!(
-            "lane {lane} is {width_m:.2} m wide at {s_m} m, and a vehicle starts in a lane of {least_m} m or more"
+            "lane {lane} is {width_m:.2} m wide at {s_m:.1} m, and a vehicle starts in a lane of {least_m} m or more"
         );
         Err(ConfigError::new("lane", Problem::Contradiction { other: "road.cross-sections", rule }))
     }
@@ -298,6 +298,36 @@ mod tests {
         let actors = scenario(start, driver).unwrap().actors;
         let [ahead_m, behind_m] = [0, 1].map(|actor| actors[actor].vehicle.dimensions.length_m);
         bumper_gap_m(actors[0].start.s_m - actors[1].start.s_m, ahead_m, behind_m)
+    }
+
+    /// A vehicle with this start, 30 m/s, on a road whose third lane ends between 600 and 700 m, and the
+    /// traffic of this block.
+    fn on_ending_lane(start: &str, traffic: &str) -> Result<Scenario, String> {
+        let text = format!(
+            "schema-version = 1\nname = 'ending'\nduration-s = 5.0\nroad = {{ lanes = 3, cross-sections = [\
+             {{ s-m = 600.0, widths-m = [3.5, 3.5, 3.5] }}, {{ s-m = 700.0, widths-m = [3.5, 3.5, 0.0] }}] }}\n\
+             [[actor]]\nid = 'ego'\nvehicle = {{ class = 'car' }}\n\
+             start = {{ absolute = {{ lane = 3, s-m = 500.0, speed-mps = 30.0 }} }}\n\
+             driver = {{ ego-stack = {{ acc = {{ time-gap-s = 0.7 }} }} }}\n\
+             [[actor]]\nid = 'front'\nvehicle = {{ class = 'car' }}\nstart = {{ {start} }}\n\
+             driver = {{ prescribed = {{ profile = [[0.0, 30.0]] }} }}\n{traffic}"
+        );
+        let file = ScenarioFile::parse(Path::new("ending.toml"), &text, &[]).map_err(|error| error.to_string())?;
+        let sample = file.space().sample(Design::Random, 0, 0, 1);
+        file.concrete(&sample).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_vehicle_does_not_start_in_a_lane_that_ends_there_however_its_place_is_given() {
+        let ahead =
+            |gap_m: f64| on_ending_lane(&format!("ahead = {{ of = 'ego', gap-m = {gap_m:?}, speed-mps = 30.0 }}"), "");
+        assert!(ahead(50.0).is_ok());
+        let error = ahead(160.0).unwrap_err();
+        assert!(error.contains("lane 3 is 1.2") && error.contains("a lane of 2.5 m or more"), "{error}");
+        let traffic = "[[traffic]]\nid = 't'\ndraw = 0.5\nvehicles = 9\nlanes = [3]\nfrom-m = 30.0\nspeed-mps = 28.0\n\
+                       speed-sd-mps = 0.0\nmean-thw-s = 1.0\ndriver = { wiedemann99 = { desired-speed-mps = 28.0 } }\n";
+        let error = on_ending_lane("absolute = { lane = 1, s-m = 500.0, speed-mps = 30.0 }", traffic).unwrap_err();
+        assert!(error.contains("where lane 3 is") && error.contains("road.cross-sections"), "{error}");
     }
 
     #[test]

@@ -120,6 +120,15 @@ pub(super) fn add(
         let start = VehicleState { speed_mps: drawn.speed_mps, ..VehicleState::default() };
         let wanted = VehicleState { s_m: wanted_m, d_m: line(wanted_m), ..start };
         let s_m = block.free_position_m(actors, &drawn.vehicle, wanted);
+        let lane = config.lanes[turn];
+        if !road.is_open(lane, [s_m; 2]) {
+            let (width_m, least_m) = (road.lane_width_m(lane, s_m), Road::LANE_WIDTH_M.low());
+            let rule = format!(
+                "`{id}` starts at {s_m:.1} m, where lane {lane} is {width_m:.2} m wide: a vehicle starts in a lane of \
+                 {least_m} m or more"
+            );
+            return Err(ConfigError::new("lanes", Problem::Contradiction { other: "road.cross-sections", rule }));
+        }
         ends[turn] = Some(Rear { s_m, length_m, speed_mps: drawn.speed_mps });
         actors.push(Actor {
             id,

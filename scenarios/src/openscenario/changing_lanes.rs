@@ -29,6 +29,8 @@ const MOST_LANES: usize = 8;
 const LEAST_SPACING_M: f64 = 1.0;
 const MOST_SECTIONS: usize = 4_096;
 const MOST_POSITION_M: f64 = 100_000.0;
+/// Width up to which a lane has ended (m): numerical.
+const NO_WIDTH_M: f64 = 1e-6;
 /// Difference of two lateral positions that matters (m): numerical.
 const SAME_M: f64 = 1e-9;
 /// Distance between two places at which the lines are compared with the file (m).
@@ -169,6 +171,8 @@ impl<'a> FileLanes<'a> {
         let ids: BTreeSet<i32> =
             sections.iter().flat_map(|section| &section.lanes).filter_map(|lane| lane.number).collect();
         let offsets = pieces(lanes, ("laneOffset", "s"), 0.0);
+        // A scenario has no place beyond.
+        let length_m = length_m.min(MOST_POSITION_M);
         Self { is_left_hand, length_m, entry, offsets, sections, ids: ids.into_iter().rev().collect() }
     }
 
@@ -372,10 +376,7 @@ impl ChangingLanes {
             let count = self.stations.len();
             return Err(format!("lines between {count} places are needed, and {MOST_SECTIONS} are allowed"));
         }
-        let is_wide = |at: &CrossSection| at.edges_m.windows(2).any(|pair| pair[0] - pair[1] >= least_m);
-        if let Some(narrow) = self.stations.iter().find(|at| !is_wide(at)) {
-            return Err(format!("each lane is narrower than {least_m} m at {} m", narrow.s_m));
-        }
+        self.check_ways(least_m)?;
         for pair in self.stations.windows(2) {
             let moves_m = pair[0].edges_m.iter().zip(&pair[1].edges_m).map(|(from_m, to_m)| (to_m - from_m).abs());
             let steepest = moves_m.fold(0.0, f64::max) / (pair[1].s_m - pair[0].s_m);
@@ -390,6 +391,28 @@ impl ChangingLanes {
         match self.deviation_m <= MOST_DEVIATION_M {
             true => Ok(()),
             false => Err(format!("lines between {} places deviate by {:.2} m", self.stations.len(), self.deviation_m)),
+        }
+    }
+
+    /// Checks that one lane has this width (m) or more along the whole road, and that each other lane
+    /// has, or ends.
+    fn check_ways(&self, least_m: f64) -> Result<(), String> {
+        let mut is_open = false;
+        for (index, id) in self.ids.iter().enumerate() {
+            let widths_m: Vec<f64> = self.stations.iter().map(|at| at.edges_m[index] - at.edges_m[index + 1]).collect();
+            is_open |= widths_m.iter().all(|width_m| *width_m >= least_m);
+            for stretch in widths_m.split(|width_m| *width_m >= least_m).filter(|stretch| !stretch.is_empty()) {
+                let narrowest_m = stretch.iter().copied().fold(f64::INFINITY, f64::min);
+                if narrowest_m > NO_WIDTH_M {
+                    return Err(format!(
+                        "lane {id} narrows to {narrowest_m:.2} m, and a lane has {least_m} m or more, or ends"
+                    ));
+                }
+            }
+        }
+        match is_open {
+            true => Ok(()),
+            false => Err(format!("no lane has {least_m} m or more along the whole road")),
         }
     }
 
@@ -523,15 +546,30 @@ mod tests {
     }
 
     #[test]
+    fn a_road_that_goes_on_for_ever_is_read_as_far_as_a_scenario_has_places() {
+        let text = section(0.0, &[(-1, "driving", FULL), (-2, "driving", GROWS)]);
+        let lanes = parse(Path::new("road.xodr"), &format!("<lanes>{text}</lanes>")).unwrap();
+        let read = super::read(&lanes, false, 1e9, (None, None)).unwrap().unwrap();
+        assert_eq!([0.0, 400.0, 99_000.0].map(|s_m| read.width_m(1, s_m)), [0.0, 3.5, 3.5]);
+    }
+
+    #[test]
     fn lanes_that_no_scenario_has_are_refused_with_the_reason() {
         let one = section(0.0, &[(-1, "driving", FULL), (-2, "driving", FULL)]);
         let jumps = one.clone() + &section(300.0, &[(-1, "driving", FULL)]);
         let between = section(0.0, &[(-1, "driving", FULL), (-2, "biking", FULL), (-3, "driving", GROWS)]);
         let narrow = section(0.0, &[(-1, "driving", "<width a=\"1\"/><width sOffset=\"50\" a=\"1\" b=\"0.001\"/>")]);
+        let narrows_to_1_5 =
+            "<width a=\"3.5\"/><width sOffset=\"100\" a=\"3.5\" b=\"-0.02\"/><width sOffset=\"200\" a=\"1.5\"/>";
+        let narrows = section(0.0, &[(-1, "driving", FULL), (-2, "driving", narrows_to_1_5)]);
+        let ends = "<width a=\"3.5\"/><width sOffset=\"600\" a=\"3.5\" b=\"-0.035\"/><width sOffset=\"700\" a=\"0\"/>";
+        let closed = section(0.0, &[(-1, "driving", GROWS), (-2, "driving", ends)]);
         for (text, reason) in [
             (jumps, "a boundary jumps by 3.50 m at 300 m"),
             (between, "a lane for another use lies between driving lanes"),
             (narrow, "lane -1 is up to 1.95 m wide, and 2.5 to 5 m are allowed"),
+            (narrows, "lane -2 narrows to 1.50 m, and a lane has 2.5 m or more, or ends"),
+            (closed, "no lane has 2.5 m or more along the whole road"),
         ] {
             let error = read(&text, false).unwrap_err();
             assert!(error.contains(reason), "{error}");

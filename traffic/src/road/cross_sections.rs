@@ -46,6 +46,8 @@ const LEAST_SPACING_M: f64 = 1.0;
 /// Length of the road before the first section and behind the last one, in the choice of the lane to
 /// which others lead (m): numerical.
 const BEYOND_M: f64 = 1_000.0;
+/// Width up to which a lane has ended (m): numerical.
+const NO_WIDTH_M: f64 = 1e-6;
 /// Difference of two positions that are the same (m): numerical.
 const SAME_M: f64 = 1e-6;
 /// Positions of sections (m).
@@ -62,7 +64,8 @@ pub struct CrossSectionConfig {
     /// Position along the road (m).
     pub s_m: Num,
     /// Width of each lane there (m), from lane 1 on: 0 to 5, where 0 is no lane. Vehicles enter a lane
-    /// of 2.5 m or more.
+    /// of 2.5 m or more. A narrower lane narrows to 0, and one lane has 2.5 m or more along the whole
+    /// road.
     pub widths_m: Vec<Num>,
     /// Lateral position of the left edge of lane 1 there (m), 0 or negative: 0 is the leftmost place of
     /// the lanes. Default: 0.
@@ -135,7 +138,40 @@ impl CrossSections {
             let rule = format!("lane {lane} is narrower than {least_m} m everywhere, and no vehicle drives there");
             return Err(ConfigError::new(KEY, Problem::Contradiction { other: "lanes", rule }));
         }
-        Ok(Self::of(checked))
+        let sections = Self::of(checked);
+        sections
+            .check_ways(lanes)
+            .map_err(|rule| ConfigError::new(KEY, Problem::Contradiction { other: "lanes", rule }))?;
+        Ok(sections)
+    }
+
+    /// Checks that vehicles have a way everywhere: one lane is open along the whole road, and each other
+    /// lane either is open or ends. The error is the rule that does not hold.
+    fn check_ways(&self, lanes: u8) -> Result<(), String> {
+        let least_m = WIDTH_M.low();
+        let is_narrow = |section: &&CrossSection, lane: usize| section.width_m(lane) < least_m;
+        let mut is_open = false;
+        for lane in 1..=usize::from(lanes) {
+            let mut rest = &self.sections[..];
+            while let Some(from) = rest.iter().position(|section| is_narrow(&section, lane)) {
+                let narrow = rest[from..].iter().take_while(|section| is_narrow(section, lane)).count();
+                let (stretch, behind) = rest[from..].split_at(narrow);
+                let narrowest = stretch.iter().min_by(|a, b| a.width_m(lane).total_cmp(&b.width_m(lane)));
+                if let Some(narrowest) = narrowest.filter(|narrowest| narrowest.width_m(lane) > NO_WIDTH_M) {
+                    let (width_m, s_m) = (narrowest.width_m(lane), narrowest.s_m);
+                    return Err(format!(
+                        "lane {lane} is {width_m:.2} m wide at {s_m} m: a lane has {least_m} m or more, or ends with the \
+                         width 0"
+                    ));
+                }
+                rest = behind;
+            }
+            is_open |= self.sections.iter().all(|section| section.width_m(lane) >= least_m);
+        }
+        match is_open {
+            true => Ok(()),
+            false => Err(format!("no lane has {least_m} m or more along the whole road, in which vehicles go on")),
+        }
     }
 
     fn of(sections: Vec<CrossSection>) -> Self {
@@ -416,7 +452,7 @@ impl CrossSectionConfig {
         if !(steepest <= STEEPEST) {
             let rule = format!(
                 "a boundary moves sideways by {steepest:.3} m in each metre behind the table before it, and {STEEPEST} \
-                 m is the most that vehicles follow"
+                 m are allowed"
             );
             return Err(ConfigError::new("s-m", Problem::Contradiction { other: "widths-m", rule }));
         }
@@ -594,6 +630,16 @@ mod tests {
             let error = sections(&format!("{first}, {second}")).unwrap_err();
             assert!(error.contains(words), "{second}: {error}");
         }
+        // A lane that stays narrower than a vehicle's lane neither ends nor is one.
+        let narrows = "{ s-m = 0.0, widths-m = [3.5, 3.5] }, { s-m = 90.0, widths-m = [3.5, 1.5] }";
+        let error = sections(narrows).unwrap_err();
+        assert!(error.contains("lane 2 is 1.50 m wide at 90 m: a lane has 2.5 m or more, or ends"), "{error}");
+        assert!(sections(&format!("{narrows}, {{ s-m = 190.0, widths-m = [3.5, 0.0] }}")).is_ok());
+        // Each lane is closed somewhere, so that no vehicle has a lane to go on in.
+        let closed = "{ s-m = 200.0, widths-m = [3.5, 0.0] }, { s-m = 300.0, widths-m = [3.5, 3.5] }, \
+                      { s-m = 400.0, widths-m = [3.5, 3.5] }, { s-m = 500.0, widths-m = [0.0, 3.5] }";
+        let error = sections(&format!("{first}, {{ s-m = 100.0, widths-m = [3.5, 3.5] }}, {closed}")).unwrap_err();
+        assert!(error.contains("no lane has 2.5 m or more along the whole road"), "{error}");
         let narrow = sections("{ s-m = 0.0, widths-m = [3.5, 1.0] }").unwrap_err();
         assert!(narrow.contains("lane 2 is narrower than 2.5 m everywhere"), "{narrow}");
         let both = check(&format!("lanes = 2\nlane-width-m = 3.5\ncross-sections = [{first}]")).unwrap_err();
