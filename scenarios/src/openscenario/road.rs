@@ -527,6 +527,10 @@ fn curvature(
             return Ok((curvature, None));
         }
     }
+    let is_polygon = shapes.len() > 1 && shapes.iter().all(|shape| shape.name == "line");
+    if is_polygon && let Err(reason) = course::alignment(path, plan, notes)? {
+        notes.push(format!("{reason}: the road is straight"));
+    }
     if shapes.iter().any(|shape| shape.name != "line") {
         let [low_m, high_m] = [Road::ALIGNMENT_D_M.low(), Road::ALIGNMENT_D_M.high()];
         if !Road::ALIGNMENT_D_M.contains(beside_m) {
@@ -723,6 +727,24 @@ mod tests {
         assert_eq!(beside(-1, steep), note(too_steep));
         let border = beside(-1, "<border a=\"-2\"/>").unwrap_err();
         assert!(border.contains("`border`: the width of a lane is read from `width`, and it has none"), "{border}");
+    }
+
+    #[test]
+    fn a_course_of_lines_that_turn_or_lie_apart_is_noted() {
+        let notes = |second: &str| {
+            let text = format!(
+                "<OpenDRIVE><road id=\"7\" length=\"200\"><planView><geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" \
+                 length=\"100\"><line/></geometry><geometry s=\"100\" {second} length=\"100\"><line/></geometry>\
+                 </planView><lanes><laneSection s=\"0\"><right><lane id=\"-1\" type=\"driving\"><width a=\"3\"/></lane>\
+                 </right></laneSection></lanes></road></OpenDRIVE>"
+            );
+            read(Path::new("road.xodr"), &text, &UsedRoad::Only).unwrap().notes
+        };
+        assert_eq!(notes("x=\"100\" y=\"0\" hdg=\"0\""), Vec::<String>::new());
+        for second in ["x=\"100\" y=\"0\" hdg=\"0.3\"", "x=\"99\" y=\"5\" hdg=\"0\""] {
+            let [note] = &notes(second)[..] else { panic!("{second}") };
+            assert!(note.contains("deviate by") && note.ends_with("the road is straight"), "{note}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! no use for it: the road would not be the one that the file means. Objects, signals, junctions
 //! and the data of other programs are not read.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use closecall_traffic::maths;
@@ -36,6 +37,40 @@ const MOST_LANE: f64 = 1_000.0;
 /// assumption; 1e-6 to 0.05, and 0.01 to 5, are plausible.
 const APART: (f64, f64) = (0.01, 1.0);
 
+/// The types of a lane of OpenDRIVE 1.4 to 1.8 (`e_laneType`).
+const LANE_TYPES: [&str; 31] = [
+    "HOV",
+    "bidirectional",
+    "biking",
+    "border",
+    "bus",
+    "connectingRamp",
+    "curb",
+    "driving",
+    "entry",
+    "exit",
+    "median",
+    "mwyEntry",
+    "mwyExit",
+    "none",
+    "offRamp",
+    "onRamp",
+    "parking",
+    "rail",
+    "restricted",
+    "roadWorks",
+    "shared",
+    "shoulder",
+    "sidewalk",
+    "slipLane",
+    "special1",
+    "special2",
+    "special3",
+    "stop",
+    "taxi",
+    "tram",
+    "walking",
+];
 /// The shapes of a piece of the reference line.
 const SHAPES: [&str; 5] = ["line", "arc", "spiral", "poly3", "paramPoly3"];
 /// The coefficients of a polynomial of third degree.
@@ -319,20 +354,73 @@ impl Checker<'_> {
         for section in &sections {
             let start_m = self.place(section, "s")?;
             self.ascends((section, "s"), starts_m.last().is_none_or(|last_m| *last_m < start_m))?;
+            if starts_m.is_empty() && start_m > tolerance_m(0.0) {
+                return Err(section.error(self.path, format!("`s` is {start_m}; the first one begins at 0")));
+            }
             starts_m.push(start_m);
         }
         for (index, section) in sections.iter().enumerate() {
             let end_m = starts_m.get(index + 1).copied().unwrap_or(self.length_m);
             let length_m = (end_m - starts_m[index]).max(0.0);
-            for lane in section.children.iter().flat_map(|side| side.all("lane")) {
-                self.lane(lane, length_m)?;
+            let beside =
+                [index.checked_sub(1), Some(index + 1)].map(|other| other.and_then(|other| sections.get(other)));
+            let mut ids = BTreeSet::new();
+            for side in &section.children {
+                for lane in side.all("lane") {
+                    let id = self.lane(lane, length_m)?;
+                    self.lane_id(lane, id, &side.name)?;
+                    if !ids.insert(id) {
+                        return Err(lane.error(self.path, format!("a lane before it has the number {id} already")));
+                    }
+                    for (name, section) in ["predecessor", "successor"].into_iter().zip(beside) {
+                        self.link(lane, name, section.copied())?;
+                    }
+                }
             }
         }
         Ok(())
     }
 
-    /// Checks a lane of a section with a length (m).
-    fn lane(&self, lane: &Node, length_m: f64) -> Result<(), ImportError> {
+    /// Checks that a lane lies on its side, and that its type is one of the standard.
+    fn lane_id(&self, lane: &Node, id: i32, side: &str) -> Result<(), ImportError> {
+        let (is_there, signs) = match side {
+            "left" => (id > 0, "above 0"),
+            "right" => (id < 0, "below 0"),
+            "center" => (id == 0, "0"),
+            _ => return Ok(()),
+        };
+        if !is_there {
+            return Err(lane.error(self.path, format!("`id` is {id}; lanes on the `{side}` have numbers {signs}")));
+        }
+        match lane.raw("type") {
+            Some(kind) if !LANE_TYPES.contains(&kind) => {
+                let message = format!("`type` is `{kind}`; one of {} is needed", LANE_TYPES.join(", "));
+                Err(lane.error(self.path, message))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks the lane with which a lane goes on in the lane section beside its own, if there is one.
+    fn link(&self, lane: &Node, name: &str, section: Option<&Node>) -> Result<(), ImportError> {
+        for link in lane.all("link").flat_map(|link| link.all(name)) {
+            let id = number(self.path, link, "id")?;
+            if id.fract() != 0.0 || !(id.abs() <= MOST_LANE) {
+                let message = format!("`id` is {id}; a whole number from {} to {MOST_LANE} is needed", -MOST_LANE);
+                return Err(link.error(self.path, message));
+            }
+            let is_it = |other: &Node| number(self.path, other, "id").is_ok_and(|other| other == id);
+            let has_lane = |section: &Node| section.children.iter().flat_map(|side| side.all("lane")).any(is_it);
+            if section.is_some_and(|section| !has_lane(section)) {
+                let message = format!("`id` is {id}, and the lane section beside it has no such lane");
+                return Err(link.error(self.path, message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks a lane of a section with a length (m). Returns its number.
+    fn lane(&self, lane: &Node, length_m: f64) -> Result<i32, ImportError> {
         let id = number(self.path, lane, "id")?;
         if id.fract() != 0.0 || !(id.abs() <= MOST_LANE) {
             let message = format!("`id` is {id}; a whole number from {} to {MOST_LANE} is needed", -MOST_LANE);
@@ -347,7 +435,8 @@ impl Checker<'_> {
                 self.place(node, "sOffset")?;
             }
         }
-        Ok(())
+        #[expect(clippy::cast_possible_truncation, reason = "a small whole number, as checked above")]
+        Ok(id as i32)
     }
 }
 
@@ -464,6 +553,17 @@ mod tests {
                 "<laneSection s=\"90\"/><laneSection s=\"50\">",
                 "`s` is 50, not after the element before it",
             ),
+            ("<lane id=\"-1\">", "<lane id=\"1\">", "`id` is 1; lanes on the `right` have numbers below 0"),
+            ("<lane id=\"-1\">", "<lane id=\"-1\"/><lane id=\"-1\">", "a lane before it has the number -1 already"),
+            ("<lane id=\"-1\">", "<lane id=\"-1\" type=\"drivng\">", "`type` is `drivng`; one of HOV, bidirectional"),
+            ("<roadMark", "<link><successor id=\"x\"/></link><roadMark", "`successor`: `id` is `x`"),
+            (
+                "</lane></right></laneSection>",
+                "<link><successor id=\"-2\"/></link></lane></right></laneSection><laneSection s=\"90\"><right>\
+                 <lane id=\"-1\"/></right></laneSection>",
+                "`successor`: `id` is -2, and the lane section beside it has no such lane",
+            ),
+            ("<laneSection s=\"0\">", "<laneSection s=\"100\">", "`s` is 100; the first one begins at 0"),
             ("id=\"-1\"", "id=\"-1.5\"", "`id` is -1.5; a whole number from -1000 to 1000"),
         ] {
             assert!(ROAD.contains(right), "{right}");
