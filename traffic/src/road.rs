@@ -37,7 +37,7 @@ use widths::{LaneWidths, MOST_LANES};
 
 use crate::acceleration_lane::{AccelerationLane, AccelerationLaneConfig};
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
-use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig, VehicleState, maths};
+use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig, maths};
 
 /// A lateral side: left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -634,12 +634,6 @@ impl Road {
     #[inline]
     pub fn lane_at(&self, s_m: f64, d_m: f64) -> Lane {
         Lane(self.widths.lane_at(self.lanes, s_m, d_m))
-    }
-
-    /// Returns the lane in which a vehicle is; beyond an edge, the lane at that edge.
-    #[inline]
-    pub fn lane_of(&self, vehicle: &VehicleState) -> Lane {
-        self.lane_at(vehicle.s_m, vehicle.d_m)
     }
 
     /// Returns the lane next to `lane` on one side, or `None` if the road has none there.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{BodyShape, Check, Choice, ConfigError, Num, Parameters, Problem, Range, Side};
+use crate::{BodyShape, Check, Choice, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Side};
 
 /// The class of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -309,6 +309,14 @@ pub struct VehicleState {
     pub brake_light: bool,
     /// State of the direction indicator.
     pub indicator: Indicator,
+}
+
+impl Road {
+    /// Returns the lane in which a vehicle is; beyond an edge, the lane at that edge.
+    #[inline]
+    pub fn lane_of(&self, vehicle: &VehicleState) -> Lane {
+        self.lane_at(vehicle.s_m, vehicle.d_m)
+    }
 }
 
 #[cfg(test)]
