@@ -306,7 +306,7 @@ fn wherever_letters_name_vehicles_a_line_says_which() {
     let out = folder.path().join("out");
     let out = out.to_str().unwrap();
     let plan = ["-n", "20", "--seed", "1", "--sensors", "object", "--controller", "acc", "--no-gate"];
-    stdout(&closecall(["campaign", "low-thw-overtake", "--out", out].iter().chain(&plan)), 0);
+    stdout(&closecall(["campaign", "low-thw-overtake", "--out", out, "--record", "each-kind"].iter().chain(&plan)), 0);
     let sample = records(Path::new(out))
         .into_iter()
         .find(|record| record.arms[0].result.as_ref().is_ok_and(|outcome| outcome.ego_collided()));

@@ -62,7 +62,8 @@ pub(crate) fn closecall<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> O
     if args.first().is_some_and(|command| command == "campaign") {
         let added = match names("--out") {
             false => &["--no-out"][..],
-            true if names("--record") => &[],
+            // Weighted runs have no recordings.
+            true if names("--record") || names("--event") => &[],
             true => &["--record", "failures:0"],
         };
         args.splice(1..1, added.iter().map(OsString::from));

@@ -61,7 +61,7 @@ impl NeighbourSearch {
     pub(super) fn find_all(&mut self, world: &World, road: &Road, looks: &[Looks], neighbours: &mut [Neighbours]) {
         self.extents.clear();
         self.extents.extend((0..world.len()).map(|actor| Extent::of(world, actor)));
-        // The lists are those of lanes that have one place along the road.
+        // The lists hold lanes that have one place along the road.
         let few = world.len() <= FEW || road.has_changing_lanes();
         if !few {
             self.sort(road);
