@@ -421,8 +421,8 @@ fn check_room(vehicle: &Vehicle, start: &VehicleState, road: &Road) -> Result<()
     if width_m <= lane_m {
         return Ok(());
     }
-    let rule =
-        format!("the vehicle is {width_m:.2} m wide, and lane {lane}, in which it starts, is {lane_m:.2} m wide");
+    let [width_m, lane_m] = [width_m, lane_m].map(|width_m| (100.0 * width_m).round() / 100.0);
+    let rule = format!("the vehicle is {width_m} m wide, and lane {lane}, in which it starts, is {lane_m} m wide");
     let other = if road.has_changing_lanes() { "road.cross-sections" } else { "road.lane-width-m" };
     let problem = Problem::Contradiction { other, rule };
     Err(ConfigError::new("width-m", problem).within("vehicle"))

@@ -93,7 +93,7 @@ fn no_vehicle_overtakes_in_a_lane_that_has_not_begun() {
     assert_eq!((watch.in_closed, watch.outside), (0, 0));
     // The watch sees a vehicle that does.
     let mut closed = Watch::default();
-    let sections = BEGINS.replace("s-m=900.0", "s-m=9000.0").replace("[0.0,", "[2.4,").replace("-3.75", "-1.35");
+    let sections = BEGINS.replace("s-m=800.0", "s-m=-9000.0").replace("s-m=900.0", "s-m=5844.0");
     let changes =
         "actor.rear.driver={prescribed={profile=[[0.0,36.0]],lane-changes=[{at-s=1.0,to=\"left\",duration-s=3.0}]}}";
     run(&scenario(&[&sections, changes]), SensorMode::GroundTruth, &mut closed);

@@ -905,7 +905,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
         ("<arc curvature=\"0.001\"/>", "", "`geometry`: its first element must be its shape, one of line, arc, spiral"),
         ("lanes>", "ways>", "no `lanes`"),
         ("laneSection", "section", "no `laneSection`"),
-        ("right>", "left>", "no lanes on the right"),
+        ("right>", "left>", "lanes on the `left` have numbers above 0"),
         ("type=\"driving\"", "type=\"walking\"", "not a driving lane"),
         ("id=\"-1\"", "id=\"one\"", "`id` is `one`"),
         ("a=\"3.5\"", "", "needs `a`"),
@@ -933,7 +933,7 @@ fn a_wrong_road_is_refused_with_file_line_and_element() {
             | "no `planView`"
             | "no `lanes`"
             | "no `laneSection`"
-            | "no lanes on the right"
+            | "lanes on the `left` have numbers above 0"
             | "not a driving lane"
             | "at 50 m it is 35; a lane" => ROAD.replace(right, wrong),
             _ => ROAD.replacen(right, wrong, 1),

@@ -11,6 +11,7 @@ use std::path::Path;
 use closecall_traffic::maths;
 
 use super::dom::{ImportError, Node, number};
+use super::entry_lane::DRIVING;
 
 /// Largest curvature of a road (1/m): no car drives through less than 5 m of radius. An assumption;
 /// 0.1 to 0.25 are plausible.
@@ -426,6 +427,10 @@ impl Checker<'_> {
             let message = format!("`id` is {id}; a whole number from {} to {MOST_LANE} is needed", -MOST_LANE);
             return Err(lane.error(self.path, message));
         }
+        let is_driving = lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
+        if is_driving && lane.child("width").is_none() && lane.child("border").is_none() {
+            return Err(lane.error(self.path, "it has no `width`"));
+        }
         let width = Limits { unit: "m", values: [0.0, MOST_ACROSS_M], slopes: None };
         self.cubics(lane, "width", ("sOffset", length_m), &width)?;
         let across = Limits { unit: "m", values: [-MOST_ACROSS_M, MOST_ACROSS_M], slopes: None };
@@ -550,12 +555,17 @@ mod tests {
             ),
             (
                 "<laneSection s=\"0\">",
-                "<laneSection s=\"90\"/><laneSection s=\"50\">",
+                "<laneSection s=\"0\"/><laneSection s=\"90\"/><laneSection s=\"50\">",
                 "`s` is 50, not after the element before it",
             ),
             ("<lane id=\"-1\">", "<lane id=\"1\">", "`id` is 1; lanes on the `right` have numbers below 0"),
             ("<lane id=\"-1\">", "<lane id=\"-1\"/><lane id=\"-1\">", "a lane before it has the number -1 already"),
             ("<lane id=\"-1\">", "<lane id=\"-1\" type=\"drivng\">", "`type` is `drivng`; one of HOV, bidirectional"),
+            (
+                "</laneSection>",
+                "<left><lane id=\"1\" type=\"driving\"/></left></laneSection>",
+                "`lane`: it has no `width`",
+            ),
             ("<roadMark", "<link><successor id=\"x\"/></link><roadMark", "`successor`: `id` is `x`"),
             (
                 "</lane></right></laneSection>",
