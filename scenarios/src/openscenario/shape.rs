@@ -427,7 +427,8 @@ impl Checker<'_> {
             let message = format!("`id` is {id}; a whole number from {} to {MOST_LANE} is needed", -MOST_LANE);
             return Err(lane.error(self.path, message));
         }
-        let is_driving = lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
+        // The lane 0 in the middle has none, whatever its type.
+        let is_driving = id != 0.0 && lane.raw("type").is_some_and(|kind| DRIVING.contains(&kind));
         if is_driving && lane.child("width").is_none() && lane.child("border").is_none() {
             return Err(lane.error(self.path, "it has no `width`"));
         }
@@ -457,7 +458,8 @@ mod tests {
         curvEnd=\"0.001\"/></geometry>\n</planView>\n<elevationProfile><elevation s=\"0\" a=\"12\" b=\"0.03\" c=\"0\" d=\"0\"/>\n\
         <elevation s=\"150\" a=\"16.5\" b=\"0\" c=\"1e-4\" d=\"0\"/></elevationProfile>\n\
         <lateralProfile><superelevation s=\"0\" a=\"0.04\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile>\n\
-        <lanes><laneOffset s=\"0\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>\n<laneSection s=\"0\"><right>\n<lane id=\"-1\">\
+        <lanes><laneOffset s=\"0\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>\n<laneSection s=\"0\"><center><lane id=\"0\" \
+        type=\"driving\"/></center><right>\n<lane id=\"-1\">\
         <width sOffset=\"0\" a=\"3.5\" b=\"0.001\" c=\"0\" d=\"0\"/>\n<roadMark sOffset=\"0\"/></lane></right>\
         </laneSection></lanes>\n<objects><object s=\"abc\"/></objects></road>";
 
