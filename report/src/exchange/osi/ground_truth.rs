@@ -160,12 +160,17 @@ fn lane_id(lane: Lane) -> Identifier {
 fn lanes(scenario: &Scenario, step: &Step, [start_m, end_m]: [f64; 2]) -> (Vec<messages::Lane>, Vec<LaneBoundary>) {
     const TYPE_DRIVING: i32 = 2;
     let road = &scenario.road;
+    let count = ((end_m - start_m) / POINT_SPACING_M).ceil().max(1.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a road has some thousand points")]
+    let evenly_m = (0..=count as u32).map(|index| start_m + (end_m - start_m) * f64::from(index) / count);
+    // Lanes whose widths change have kinks.
+    let kinks_m = road.cross_sections_m().filter(|s_m| start_m < *s_m && *s_m < end_m);
+    let mut places_m: Vec<f64> = evenly_m.chain(kinks_m).collect();
+    places_m.sort_by(f64::total_cmp);
+    places_m.dedup();
     let line = |d_m: &dyn Fn(f64) -> f64| -> Vec<Vector3d> {
-        let count = ((end_m - start_m) / POINT_SPACING_M).ceil().max(1.0);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a road has some thousand points")]
-        let points = (0..=count as u32).map(|index| {
-            let s_m = start_m + (end_m - start_m) * f64::from(index) / count;
-            let pose = road.plane_pose(s_m, d_m(s_m), 0.0);
+        let points = places_m.iter().map(|s_m| {
+            let pose = road.plane_pose(*s_m, d_m(*s_m), 0.0);
             vector(pose.x_m, pose.y_m, 0.0)
         });
         points.collect()
