@@ -119,7 +119,8 @@ pub(super) fn read(
     let mut stations = file.stations()?;
     let first = stations.first().map(|station| station.edges_m.clone()).unwrap_or_default();
     let is_same = |station: &CrossSection| station.edges_m.iter().zip(&first).all(|(a, b)| (a - b).abs() <= SAME_M);
-    if stations.iter().all(is_same) {
+    // Lanes whose numbers change are told apart by their cross-sections.
+    if stations.iter().all(is_same) && numbering.is_none() {
         return Ok(None);
     }
     simplify(&mut stations);

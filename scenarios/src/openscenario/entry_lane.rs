@@ -63,11 +63,19 @@ pub(super) fn find(lanes: &Node, side: &str, length_m: f64) -> Option<EntryLane>
         stretches.extend(widths(lane, [*section, *end_m])?);
         from_m = from_m.min(lanes.get(&inner).map_or(*section, |inner| opens_m(inner, *section)));
     }
+    // A lane begins where it has a width.
+    let begins = stretches.iter().position(|stretch| stretch.widths_m.iter().any(|width_m| *width_m >= NO_WIDTH_M))?;
+    let stretches = &stretches[begins..];
     let is_rising = |stretch: &&Stretch| !stretch.is_constant;
     let falling = stretches.iter().rev().take_while(|stretch| !stretch.is_constant).count();
     let narrows = &stretches[stretches.len() - falling..];
     let (first, last) = (narrows.first()?, narrows.last()?);
     let full = stretches[..stretches.len() - falling].iter().find(|stretch| stretch.is_constant)?;
+    // A lane that becomes wider or narrower on its way is another lane than the one of a scenario.
+    let mut way = stretches[..stretches.len() - falling].iter().skip_while(is_rising);
+    if way.any(|stretch| !stretch.is_constant || (stretch.widths_m[0] - full.widths_m[0]).abs() > NO_WIDTH_M) {
+        return None;
+    }
     let rises_to_m = stretches.iter().take_while(is_rising).last().map_or(full.from_m, |stretch| stretch.to_m);
     let ends = last.widths_m[1] < NO_WIDTH_M && last.to_m < length_m;
     let positions = AccelerationLane { from_m: from_m.max(rises_to_m), to_m: first.from_m, taper_end_m: last.to_m };

@@ -28,6 +28,8 @@ const NO_LIMIT: [&str; 2] = ["no limit", "undefined"];
 /// Largest distance between two lanes that lie beside each other (m): the numbers of a file are
 /// rounded.
 const MOST_GAP_M: f64 = 0.01;
+/// Coefficient, and difference of two, up to which a polynomial does not change: numerical.
+const ROUNDED: f64 = 1e-9;
 /// Distance between lanes whose width changes and their lines from which on a note states it (m):
 /// numerical.
 const NOTED_DEVIATION_M: f64 = 1e-6;
@@ -103,6 +105,12 @@ impl ImportedRoad {
             Some(changing) => changing.centre_m(index, s_m) + self.alignment_d_m,
             None => -(self.widths_m.iter().take(index).sum::<f64>() + self.half_width_m(index, s_m)),
         }
+    }
+
+    /// Returns the length of the path that a vehicle covers per metre of the reference line (m/m): below 1
+    /// on the inside of a bend. The vehicle is at `s_m`, `t_m` to the left of the line.
+    pub(super) fn path_scale(&self, s_m: f64, t_m: f64) -> f64 {
+        self.line.as_ref().map_or(1.0, |line| line.course.path_scale(s_m, t_m))
     }
 
     /// Returns the index of the lane in which a place (m) lies, or to whose edge it is nearest: at
@@ -198,7 +206,13 @@ fn driving_lanes(
     let mut driving: Vec<DrivingLane> = Vec::new();
     for node in along.all("lane").filter(|node| node.raw("type").is_some_and(|kind| DRIVING.contains(&kind))) {
         let id = number(path, node, "id")?;
-        let Some(width) = node.child("width") else { return Err(node.error(path, "it has no `width`")) };
+        let Some(width) = node.child("width") else {
+            let (node, message) = match node.child("border") {
+                Some(border) => (border, "the width of a lane is read from `width`, and it has none"),
+                None => (node, "it has no `width`"),
+            };
+            return Err(node.error(path, message));
+        };
         number(path, width, "a")?;
         let width_m = width_m(node, place.within_section_m);
         #[expect(clippy::cast_possible_truncation, reason = "a small whole number, as `shape::check` has checked")]
@@ -451,9 +465,14 @@ fn centres_m(lanes: &Node, along: &Node, driving: &[DrivingLane], place: Place) 
     all.sort_by_key(|lane| lane.id.unsigned_abs());
     let mut from_m = polynomial_m(lanes, "laneOffset", "s", place.s_m);
     let mut centres_m = Vec::new();
+    // A shoulder may have the number that the acceleration lane has in a later section.
+    let is_driving = |id: i32| {
+        let kind = along.all("lane").find(|lane| value(lane, "id") == f64::from(id)).and_then(|lane| lane.raw("type"));
+        kind.is_some_and(|kind| DRIVING.contains(&kind))
+    };
     for lane in all {
         let to_m = from_m + lane.width_m * f64::from(lane.id.signum());
-        if driving.iter().any(|other| other.id == lane.id) {
+        if driving.iter().any(|other| other.id == lane.id) && is_driving(lane.id) {
             centres_m.push((lane.id, 0.5 * (from_m + to_m)));
         }
         from_m = to_m;
@@ -573,9 +592,9 @@ fn widths_change<'a>(
 
 /// Returns whether the polynomials of a name do not have the same value everywhere.
 fn changes(parent: &Node, name: &str) -> bool {
-    let is_sloped = |piece: &Node| ["b", "c", "d"].iter().any(|name| value(piece, name) != 0.0);
-    let first = parent.child(name).map(|piece| value(piece, "a"));
-    parent.all(name).any(|piece| is_sloped(piece) || Some(value(piece, "a")) != first)
+    let is_sloped = |piece: &Node| ["b", "c", "d"].iter().any(|name| value(piece, name).abs() > ROUNDED);
+    let first = parent.child(name).map(|piece| value(piece, "a")).unwrap_or_default();
+    parent.all(name).any(|piece| is_sloped(piece) || (value(piece, "a") - first).abs() > ROUNDED)
 }
 
 /// Returns the first speed limit of a road (m/s), with a note if it has others.

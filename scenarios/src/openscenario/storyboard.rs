@@ -797,7 +797,9 @@ impl<'a> Storyboard<'a> {
 
     pub(super) fn advance(&mut self) {
         for vehicle in &mut self.vehicles {
-            vehicle.s_m += vehicle.speed_mps * STEP_S;
+            let centre_m = self.road.index(vehicle.lane).map(|index| self.road.file_centre_m(index, vehicle.s_m));
+            let scale = self.road.path_scale(vehicle.s_m, centre_m.unwrap_or_default() + vehicle.offset_m);
+            vehicle.s_m += vehicle.speed_mps * STEP_S / scale;
             vehicle.travelled_m += vehicle.speed_mps * STEP_S;
         }
         self.time_s = ((self.time_s + STEP_S) / STEP_S).round() * STEP_S;

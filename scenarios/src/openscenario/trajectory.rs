@@ -86,7 +86,8 @@ impl Storyboard<'_> {
             let (from, to, line, element) = (lanes[from], lanes[to], node.line, "FollowTrajectoryAction");
             lane_changes.push(LaneChange { vehicle, at_s, from, to, duration_s, line, element });
         }
-        let speeds = speeds(&points).map_err(|message| reader.error(line, message))?;
+        let speeds = speeds(&points, |at| self.road.path_scale(at.s_m, at.t_m))
+            .map_err(|message| reader.error(line, message))?;
         Ok(Driven { speeds, lane_changes })
     }
 
@@ -165,13 +166,16 @@ impl Storyboard<'_> {
 }
 
 /// Returns the speeds at the vertices and in the middle between them (m/s). In the middle it is the
-/// mean speed from vertex to vertex, so that the vehicle passes each middle at its time.
-fn speeds(points: &[Point]) -> Result<Vec<(f64, f64)>, String> {
+/// mean speed from vertex to vertex, so that the vehicle passes each middle at its time. `scale` gives
+/// the length of the path of a vehicle per metre of the reference line.
+fn speeds(points: &[Point], scale: impl Fn(RoadPoint) -> f64) -> Result<Vec<(f64, f64)>, String> {
     let mut speeds: Vec<(f64, f64)> = Vec::new();
     let mut before: Option<(f64, f64)> = None;
     for pair in points.windows(2) {
         let duration_s = pair[1].at_s - pair[0].at_s;
-        let mean_mps = (pair[1].on_road.s_m - pair[0].on_road.s_m) / duration_s;
+        let [from, to] = [pair[0].on_road, pair[1].on_road];
+        let middle = RoadPoint { s_m: 0.5 * (from.s_m + to.s_m), t_m: 0.5 * (from.t_m + to.t_m) };
+        let mean_mps = scale(middle) * (to.s_m - from.s_m) / duration_s;
         // A vehicle that stands is written with rounding.
         if !(-STANDING_MPS..=MOST_SPEED_MPS).contains(&mean_mps) {
             return Err(format!("{mean_mps:.2} m/s from {:.2} s; 0 to {MOST_SPEED_MPS} m/s are needed", pair[0].at_s));
@@ -254,7 +258,7 @@ mod tests {
     #[test]
     fn the_speeds_pass_the_middle_of_each_piece_at_its_time() {
         let points = [(0.0, 0.0), (1.0, 30.0), (1.5, 42.0), (4.0, 92.0), (4.2, 96.0)].map(|(t, s)| point(t, s, -1.75));
-        let speeds = speeds(&points).unwrap();
+        let speeds = speeds(&points, |_| 1.0).unwrap();
         let mut driven_m = 0.0;
         for (index, pair) in speeds.windows(2).enumerate() {
             driven_m += 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0);
@@ -264,8 +268,12 @@ mod tests {
                 assert!(error_m.abs() < 1e-9, "{index}: {error_m}");
             }
         }
-        assert!(super::speeds(&[point(0.0, 0.0, 0.0), point(1.0, -5.0, 0.0)]).unwrap_err().contains("-5.00 m/s"));
-        assert!(super::speeds(&[point(0.0, 0.0, 0.0), point(1.0, 500.0, 0.0)]).is_err());
+        let of_two = |to_m: f64| super::speeds(&[point(0.0, 0.0, 0.0), point(1.0, to_m, 0.0)], |_| 1.0);
+        assert!(of_two(-5.0).unwrap_err().contains("-5.00 m/s"));
+        assert!(of_two(500.0).is_err());
+        // On the inside of a bend of 500 m, 10 m beside the line, the path is shorter by 2 %.
+        let inside = super::speeds(&[point(0.0, 0.0, 10.0), point(1.0, 30.0, 10.0)], |at| 1.0 - 0.002 * at.t_m);
+        assert!((inside.unwrap()[0].1 - 29.4).abs() < 1e-9);
     }
 
     /// The lane changes among lanes of 3.5 m from the left on.
