@@ -887,6 +887,65 @@ fn an_acceleration_is_checked_where_a_vehicle_of_the_scenario_has_it() {
     assert!(output.exists());
 }
 
+/// Returns a lane section on the right of a road.
+fn lane_section(s_m: u32, lanes: &[(i32, &str, &str)]) -> String {
+    let lane = |(id, kind, rest): &(i32, &str, &str)| format!("<lane id=\"{id}\" type=\"{kind}\">{rest}</lane>");
+    let lanes: String = lanes.iter().map(lane).collect();
+    format!("<laneSection s=\"{s_m}\"><right>{lanes}</right></laneSection>")
+}
+
+#[test]
+fn a_ramp_beside_a_shoulder_lies_where_the_file_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    const LANE: &str = "<width sOffset=\"0\" a=\"3.5\"/>";
+    const ENDS: &str = "<width sOffset=\"400\" a=\"3.5\" c=\"-0.00105\" d=\"7e-6\"/>";
+    let imported_with = |widths: &str| {
+        let with_ramp = [(-1, "driving", LANE), (-2, "driving", LANE), (-3, "entry", widths), (-4, "shoulder", LANE)];
+        let after = lane_section(1_000, &[(-1, "driving", LANE), (-2, "driving", LANE), (-3, "shoulder", LANE)]);
+        let sections = format!("</laneSection>{}{after}", lane_section(500, &with_ramp));
+        let road = ROAD.replacen("</laneSection>", &sections, 1);
+        let said = stdout(&imported(&written(folder.path(), SCENARIO, &road), &output, &[]), 0);
+        assert!(!said.contains("between its lanes"), "{said}");
+        (said, fs::read_to_string(&output).unwrap())
+    };
+    let rises =
+        "<width sOffset=\"0\" a=\"0\" c=\"0.001640625\" d=\"-1.3671875e-05\"/><width sOffset=\"80\" a=\"3.5\"/>";
+    let (_, text) = imported_with(&format!("{rises}{ENDS}"));
+    assert!(text.contains("acceleration-lane = { from-m = 580.0, length-m = 320.0, taper-m = 100.0 }"), "{text}");
+    // It has no width at first.
+    let later = rises.replace("\"0\" a=", "\"50\" a=").replace("\"80\"", "\"130\"");
+    let (_, text) = imported_with(&format!("<width sOffset=\"0\" a=\"0\"/>{later}{ENDS}"));
+    assert!(text.contains("acceleration-lane = { from-m = 630.0, length-m = 270.0, taper-m = 100.0 }"), "{text}");
+    // It becomes wider on its way, as no acceleration lane of a scenario does.
+    let widens = "<width sOffset=\"200\" a=\"3.5\" b=\"0.005\"/><width sOffset=\"300\" a=\"4\"/>\
+                  <width sOffset=\"400\" a=\"4\" c=\"-0.0012\" d=\"8e-6\"/>";
+    let (said, text) = imported_with(&format!("{rises}{widens}"));
+    assert!(text.contains("cross-sections") && !text.contains("acceleration-lane"), "{text}");
+    assert!(said.contains("lanes whose width or place changes"), "{said}");
+}
+
+#[test]
+fn a_lane_that_gets_another_number_where_nothing_moves_is_the_same_lane() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("scenario.toml");
+    // A median ends, and the offset of the lanes takes its place.
+    let lane = |before: i32| format!("<link><predecessor id=\"{before}\"/></link><width sOffset=\"0\" a=\"3.5\"/>");
+    let (full, [first, second]) = ("<width sOffset=\"0\" a=\"3.5\"/>", [-2, -3].map(lane));
+    let median = "<width sOffset=\"0\" a=\"2\"/>";
+    let sections = lane_section(0, &[(-1, "median", median), (-2, "driving", full), (-3, "driving", full)])
+        + &lane_section(500, &[(-1, "driving", &first), (-2, "driving", &second)]);
+    let (before, rest) = ROAD.split_once("<laneSection").unwrap();
+    let (_, after) = rest.split_once("</laneSection>").unwrap();
+    let offset = "<laneOffset s=\"0\" a=\"0\"/><laneOffset s=\"500\" a=\"-2\"/>";
+    let road = format!("{before}{offset}{sections}{after}");
+    let scenario = SCENARIO.replace("laneId=\"-1\"", "laneId=\"-2\"");
+    let said = stdout(&imported(&written(folder.path(), &scenario, &road), &output, &[]), 0);
+    assert!(said.contains("lanes that get another number"), "{said}");
+    let run = ["run", output.to_str().unwrap(), "--sensors", "ground-truth"];
+    stdout(&closecall(run), 0);
+}
+
 #[test]
 fn a_wrong_road_is_refused_with_file_line_and_element() {
     let folder = tempfile::tempdir().unwrap();

@@ -353,6 +353,10 @@ impl Checker<'_> {
         let sections: Vec<&Node> = lanes.all("laneSection").collect();
         let mut starts_m = Vec::with_capacity(sections.len());
         for section in &sections {
+            if section.raw("singleSide") == Some("true") {
+                let message = "`singleSide` is not read: a section needs the lanes of both sides";
+                return Err(section.error(self.path, message));
+            }
             let start_m = self.place(section, "s")?;
             self.ascends((section, "s"), starts_m.last().is_none_or(|last_m| *last_m < start_m))?;
             if starts_m.is_empty() && start_m > tolerance_m(0.0) {
@@ -575,6 +579,7 @@ mod tests {
                  <lane id=\"-1\"/></right></laneSection>",
                 "`successor`: `id` is -2, and the lane section beside it has no such lane",
             ),
+            ("<laneSection s=\"0\">", "<laneSection s=\"0\" singleSide=\"true\">", "`singleSide` is not read"),
             ("<laneSection s=\"0\">", "<laneSection s=\"100\">", "`s` is 100; the first one begins at 0"),
             ("id=\"-1\"", "id=\"-1.5\"", "`id` is -1.5; a whole number from -1000 to 1000"),
         ] {
