@@ -16,6 +16,13 @@ fn written(folder: &Path, scenario: &str, road: &str) -> PathBuf {
     path
 }
 
+/// The road, but straight: each lane is as long as the reference line.
+fn straight_road() -> String {
+    let straight = ROAD.replace("<arc curvature=\"0.001\"/>", "<line/>");
+    assert_ne!(straight, ROAD);
+    straight
+}
+
 /// Imports a file with further options.
 fn imported(path: &Path, output: &Path, more: &[&str]) -> std::process::Output {
     let (path, output) = (path.to_str().unwrap(), output.to_str().unwrap());
@@ -64,7 +71,7 @@ fn a_cut_in_has_the_starts_speeds_and_lane_changes_of_the_file() {
 #[test]
 fn parameters_and_the_ego_are_options() {
     let folder = tempfile::tempdir().unwrap();
-    let (path, output) = (written(folder.path(), SCENARIO, ROAD), folder.path().join("scenario.toml"));
+    let (path, output) = (written(folder.path(), SCENARIO, &straight_road()), folder.path().join("scenario.toml"));
     let said = stdout(&imported(&path, &output, &["--parameter", "Gap=80"]), 0);
     assert!((time_of(&said, "cut-in begins") - 5.0).abs() <= 0.011, "{said}");
     let refused = imported(&path, &output, &["--parameter", "Gab=80"]);
@@ -197,7 +204,7 @@ fn a_trajectory_becomes_speeds_and_lane_changes() {
     let output = folder.path().join("scenario.toml");
     // The cut-in begins at 3 s, when the truck is at 170 m.
     let points = [(0.0, -2, 170.0), (1.0, -2, 190.0), (5.0, -1, 270.0), (8.0, -1, 330.0)];
-    let path = written(folder.path(), &with_trajectory(TIMING, &points), ROAD);
+    let path = written(folder.path(), &with_trajectory(TIMING, &points), &straight_road());
     let said = stdout(&imported(&path, &output, &[]), 0);
     assert!((time_of(&said, "cut-in ends") - 11.0).abs() <= 0.021, "{said}");
     let text = fs::read_to_string(&output).unwrap();
@@ -221,14 +228,14 @@ fn a_trajectory_becomes_speeds_and_lane_changes() {
     ];
     for (attributes, points, word) in wrong {
         fs::remove_file(&output).ok();
-        let refused = imported(&written(folder.path(), &with_trajectory(attributes, points), ROAD), &output, &[]);
+        let refused = imported(&written(folder.path(), &with_trajectory(attributes, points), &straight_road()), &output, &[]);
         let said = message(&refused);
         assert_eq!(code(&refused), 3, "{said}");
         assert!(said.contains("case.xosc:") && said.contains(word), "{word}: {said}");
         assert!(!output.exists());
     }
     let nurbs = with_trajectory(TIMING, &points).replace("Polyline>", "Nurbs>");
-    let refused = imported(&written(folder.path(), &nurbs, ROAD), &output, &[]);
+    let refused = imported(&written(folder.path(), &nurbs, &straight_road()), &output, &[]);
     assert!(message(&refused).contains("`Nurbs`: it is not read"), "{}", message(&refused));
 }
 
@@ -268,7 +275,7 @@ fn a_position_in_the_plane_is_a_position_on_the_road() {
 fn a_file_of_values_gives_one_of_its_combinations_to_the_scenario_that_it_names() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("scenario.toml");
-    written(folder.path(), SCENARIO, ROAD);
+    written(folder.path(), SCENARIO, &straight_road());
     let path = folder.path().join("values.xosc");
     let values = "<OpenSCENARIO><FileHeader revMajor=\"1\" revMinor=\"3\" date=\"2026-01-01T00:00:00\" \
                   description=\"\" author=\"\"/>\n<ParameterValueDistribution><ScenarioFile \
@@ -521,7 +528,7 @@ fn a_synchronised_vehicle_arrives_at_its_target_when_its_master_does() {
         (relative("-5", "delta"), 25.0, 13.0),
         (relative("0.7", "factor"), 21.0, 13.0),
     ] {
-        let path = written(folder.path(), &synchronised(MASTER, 440.0, 400.0, &rest), ROAD);
+        let path = written(folder.path(), &synchronised(MASTER, 440.0, 400.0, &rest), &straight_road());
         let said = stdout(&imported(&path, &output, &[]), 0);
         assert!((time_of(&said, "cut-in ends") - 13.0).abs() <= 0.021, "{rest}: {said}");
         assert!(said.contains("`Slow_Truck` arrives at its target at 13.00 s"), "{said}");
@@ -1792,8 +1799,8 @@ fn heights_other_roads_and_the_end_of_a_road_are_noted() {
         )
     };
     let road = |from: &str, to: &str| {
-        let text = ROAD.replace(from, to);
-        assert!(text != ROAD, "{from}");
+        let text = straight_road().replace(from, to);
+        assert!(text != straight_road(), "{from}");
         text
     };
     let (_, rest) = ROAD.split_once("<road ").unwrap();
