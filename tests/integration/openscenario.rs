@@ -228,7 +228,8 @@ fn a_trajectory_becomes_speeds_and_lane_changes() {
     ];
     for (attributes, points, word) in wrong {
         fs::remove_file(&output).ok();
-        let refused = imported(&written(folder.path(), &with_trajectory(attributes, points), &straight_road()), &output, &[]);
+        let refused =
+            imported(&written(folder.path(), &with_trajectory(attributes, points), &straight_road()), &output, &[]);
         let said = message(&refused);
         assert_eq!(code(&refused), 3, "{said}");
         assert!(said.contains("case.xosc:") && said.contains(word), "{word}: {said}");
