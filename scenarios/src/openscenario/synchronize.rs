@@ -143,6 +143,13 @@ impl Storyboard<'_> {
             None => None,
         };
         let from_mps = self.vehicles[actor].speed_mps;
+        // On a bend, the way beside the reference line has its own length.
+        let vehicle = &self.vehicles[actor];
+        let scale = |s_m: f64| {
+            let centre_m = self.road.index(vehicle.lane).map(|index| self.road.file_centre_m(index, s_m));
+            self.road.path_scale(s_m, centre_m.unwrap_or_default() + vehicle.offset_m)
+        };
+        let way_m = 0.5 * (scale(vehicle.s_m) + scale(target_m)) * way_m;
         let approach = Approach { way_m, duration_s, from_mps, end };
         // The controller drives the ego, whatever its action asks for.
         let speeds = if actor == self.ego { approach.course() } else { approach.speeds() };
