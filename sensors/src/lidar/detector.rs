@@ -10,8 +10,9 @@ use super::classify::{class_scores, typical_size_m};
 use super::clustering::{ClusteredPoints, Clustering, ClusteringCheck, ClusteringModel, NOISE};
 use super::ground::select_candidates;
 use super::parts::join_lamps;
+use super::wheels::wheel_fronts;
 use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
-use crate::tracking::SIDE_PROTRUSION_M;
+use crate::tracking::{SIDE_PROTRUSION_M, WheelFronts};
 
 use crate::{Detection, Extent, SeenBy, SeenPart, SensorError};
 
@@ -53,6 +54,10 @@ const SIDE_SEEN_M: f64 = 3.0;
 /// (m).
 const SIDE_SPACING_M: f64 = 0.5;
 
+/// Distance of a vehicle up to which its wheels are searched (m; assumption): farther away, one beam
+/// or none is below their hubs.
+const WHEELS_REACH_M: f64 = 25.0;
+
 /// The detector of the rear LiDAR. It keeps no state from scan to scan except allocated memory.
 #[derive(Clone, Debug, Default)]
 pub struct Detector {
@@ -70,6 +75,8 @@ pub struct Detector {
     /// For each cluster, whether it is a pair of headlamps.
     is_pair: Vec<bool>,
     detections: Vec<Detection>,
+    /// The low points of a cluster: positions along and across (m).
+    low: Vec<[f64; 2]>,
 }
 
 impl Detector {
@@ -85,6 +92,7 @@ impl Detector {
             parents: Vec::with_capacity(RESERVED_CLUSTERS),
             is_pair: Vec::with_capacity(RESERVED_CLUSTERS),
             detections: Vec::with_capacity(RESERVED_CLUSTERS),
+            low: Vec::new(),
         }
     }
 
@@ -110,7 +118,8 @@ impl Detector {
         }
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
-            self.detections.push(detection(&self.fits[index], hidden, self.is_pair[index], scan.start, lane));
+            let wheels = self.wheels_of(index, scan);
+            self.detections.push(detection(&self.fits[index], hidden, self.is_pair[index], wheels, scan.start, lane));
         }
         Ok(&self.detections)
     }
@@ -162,9 +171,20 @@ impl Detector {
         self.fit(scan, lane);
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
-            self.detections.push(detection(&self.fits[index], hidden, false, scan.start, lane));
+            let wheels = self.wheels_of(index, scan);
+            self.detections.push(detection(&self.fits[index], hidden, false, wheels, scan.start, lane));
         }
         Ok(&self.detections)
+    }
+
+    /// Returns the fronts of the wheels of a cluster, if a side is seen nearby.
+    fn wheels_of(&mut self, cluster: usize, scan: &LidarScan) -> WheelFronts {
+        let fit = &self.fits[cluster];
+        if !fit.sees_side() || fit.range_m > WHEELS_REACH_M {
+            return WheelFronts::NONE;
+        }
+        let members = &self.members[self.starts[cluster] as usize..self.starts[cluster + 1] as usize];
+        wheel_fronts(fit, members, scan, &mut self.low)
     }
 
     /// Returns the boxes detected in the latest scan.
@@ -299,7 +319,14 @@ fn occluded_edges(index: usize, fits: &[BoxFit]) -> [bool; 2] {
 
 /// Returns the detection for a fitted box. `hidden` tells whether its edge at the least and at the
 /// greatest azimuth is hidden, `is_pair` whether it surrounds a pair of headlamps.
-fn detection(fit: &BoxFit, hidden: [bool; 2], is_pair: bool, start: Time, lane: &LaneGeometry) -> Detection {
+fn detection(
+    fit: &BoxFit,
+    hidden: [bool; 2],
+    is_pair: bool,
+    wheels: WheelFronts,
+    start: Time,
+    lane: &LaneGeometry,
+) -> Detection {
     // Vehicles point in about the same direction as the ego: the edge at the least azimuth is also
     // that at the least v.
     let width_seen = !hidden[0] && !hidden[1];
@@ -331,6 +358,7 @@ fn detection(fit: &BoxFit, hidden: [bool; 2], is_pair: bool, start: Time, lane: 
             along_m: [fit.rear_u_m, fit.front_u_m].map(|u_m| u_m - front_u_m),
             across_m: fit.across_m.map(|v_m| v_m - across.middle_m),
             spacing_m: [fit.rear_u_m, fit.front_u_m].map(|u_m| side_spacing_m(fit, u_m)),
+            wheels: wheels.shifted(-front_u_m),
         },
         class,
     }

@@ -52,6 +52,7 @@ mod targets;
 #[cfg(test)]
 mod tests;
 mod viewpoint;
+mod wheels;
 
 /// Number of clusters in a scan for which memory is reserved. A scan with more clusters reserves
 /// more.

@@ -7,7 +7,8 @@
 use std::collections::BTreeSet;
 
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, TrackId, TrackStatus, VehicleClass,
+    ActorId, BodyShape, CONTROL_STEP, Check, Dimensions, Environment, Parameters, Road, Source, TrackId, TrackStatus,
+    VehicleClass,
 };
 
 use super::tracking::PERIOD_S;
@@ -24,6 +25,7 @@ const SPEED_MPS: f64 = 1.0;
 /// A long vehicle in a neighbouring lane, at a constant speed.
 #[derive(Clone, Copy, Debug)]
 struct Passing {
+    shape: BodyShape,
     length_m: f64,
     /// Lateral distance from the ego (m), positive to the left.
     left_m: f64,
@@ -62,7 +64,8 @@ fn pass(passing: &Passing, sample: u64) -> Observed {
     let rear_s_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m;
     let s_m = rear_s_m + passing.front_m - 0.5 * passing.length_m;
     let mut truck = scene_vehicle(1, VehicleClass::Truck, s_m, OWN_LANE_M + passing.left_m);
-    truck.vehicle.dimensions.length_m = passing.length_m;
+    truck.vehicle.dimensions = Dimensions { length_m: passing.length_m, ..passing.shape.usual_dimensions() };
+    truck.vehicle.appearance.body_shape = passing.shape;
     truck.state.speed_mps = EGO_MPS + passing.faster_mps;
     let mut observed = Observed::default();
     let mut confirmed_at: Vec<(TrackId, usize)> = Vec::new();
@@ -108,9 +111,9 @@ fn pass(passing: &Passing, sample: u64) -> Observed {
 
 /// Returns passings of a vehicle of this length: it overtakes slowly and fast, the ego passes it
 /// slowly and fast, and it is beside the ego from the start.
-fn passings(length_m: f64, left_m: f64) -> Vec<Passing> {
+fn passings(shape: BodyShape, length_m: f64, left_m: f64) -> Vec<Passing> {
     let passing =
-        |faster_mps: f64, front_m: f64, seconds: f64| Passing { length_m, left_m, faster_mps, front_m, seconds };
+        |faster_mps: f64, front_m: f64, seconds: f64| Passing { shape, length_m, left_m, faster_mps, front_m, seconds };
     vec![
         passing(2.0, -30.0, 19.0 + 0.5 * length_m),
         passing(6.0, -60.0, 13.0 + length_m / 6.0),
@@ -136,33 +139,45 @@ fn assert_one_track(cases: &[Passing]) {
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
 }
 
+/// Returns passings of vehicles of these shapes and lengths in either neighbouring lane.
+fn in_both_lanes(vehicles: impl IntoIterator<Item = (BodyShape, f64)>) -> Vec<Passing> {
+    let of_lane = |(shape, length_m): (BodyShape, f64)| [3.75, -3.75].map(|left_m| passings(shape, length_m, left_m));
+    vehicles.into_iter().flat_map(of_lane).flatten().collect()
+}
+
 #[test]
 fn a_truck_that_passes_or_is_passed_is_one_track_with_its_speed_and_class() {
-    let lanes = [3.75, -3.75].into_iter();
-    let cases: Vec<_> = lanes
-        .flat_map(|left_m| [12.0, 16.5, 18.0, 25.0].into_iter().flat_map(move |length_m| passings(length_m, left_m)))
-        .collect();
-    assert_one_track(&cases);
+    assert_one_track(&in_both_lanes([12.0, 16.5, 18.0, 25.0].map(|length_m| (BodyShape::TarpaulinTrailer, length_m))));
+}
+
+#[test]
+fn trucks_of_every_shape_are_one_track() {
+    // A tank, a platform and a coach have no panels like those of a trailer: their wheels tell how they
+    // move. Of a shorter truck beside the ego, too little is seen.
+    let lengths = |shape: &BodyShape| (*shape, shape.usual_dimensions().length_m.max(12.0));
+    let usual = BodyShape::of_class(VehicleClass::Truck).iter().map(lengths);
+    assert_one_track(&in_both_lanes(usual.filter(|(shape, _)| *shape != BodyShape::TarpaulinTrailer)));
+    assert_one_track(&in_both_lanes([(BodyShape::Tanker, 18.0), (BodyShape::PlatformTruck, 25.0)]));
 }
 
 #[test]
 fn trucks_of_other_lengths_speeds_and_offsets_are_one_track_too() {
     let mut cases = Vec::new();
-    for (length_m, left_m, faster_mps, front_m, seconds) in [
-        (10.0, 3.5, 3.0, -40.0, 22.0),
-        (13.6, -3.9, 1.2, -15.0, 25.0),
-        (15.0, 4.1, 9.0, -80.0, 14.0),
-        (17.3, -3.4, 4.0, -70.0, 25.0),
-        (19.0, 3.6, 1.5, -12.0, 25.0),
-        (22.0, -3.75, 2.5, -25.0, 22.0),
-        (10.5, 3.6, -3.0, 14.0, 18.0),
-        (13.6, 3.9, -1.2, 15.0, 30.0),
-        (14.2, -3.5, -9.0, 40.0, 12.0),
-        (17.3, 3.4, -4.0, 30.0, 20.0),
-        (19.0, -4.0, -1.5, 20.0, 30.0),
-        (22.0, 3.75, -2.5, 25.0, 25.0),
+    for (shape, length_m, left_m, faster_mps, front_m, seconds) in [
+        (BodyShape::TarpaulinTrailer, 10.0, 3.5, 3.0, -40.0, 22.0),
+        (BodyShape::Tanker, 13.6, -3.9, 1.2, -15.0, 25.0),
+        (BodyShape::BoxTrailer, 15.0, 4.1, 9.0, -80.0, 14.0),
+        (BodyShape::PlatformTruck, 17.3, -3.4, 4.0, -70.0, 25.0),
+        (BodyShape::TarpaulinTrailer, 19.0, 3.6, 1.5, -12.0, 25.0),
+        (BodyShape::Tanker, 22.0, -3.75, 2.5, -25.0, 22.0),
+        (BodyShape::BoxTruck, 10.5, 3.6, -3.0, 14.0, 18.0),
+        (BodyShape::TarpaulinTrailer, 13.6, 3.9, -1.2, 15.0, 30.0),
+        (BodyShape::Coach, 14.2, -3.5, -9.0, 40.0, 12.0),
+        (BodyShape::PlatformTruck, 17.3, 3.4, -4.0, 30.0, 20.0),
+        (BodyShape::BonnetedTractor, 19.0, -4.0, -1.5, 20.0, 30.0),
+        (BodyShape::Tanker, 22.0, 3.75, -2.5, 25.0, 25.0),
     ] {
-        cases.push(Passing { length_m, left_m, faster_mps, front_m, seconds });
+        cases.push(Passing { shape, length_m, left_m, faster_mps, front_m, seconds });
     }
     assert_one_track(&cases);
 }

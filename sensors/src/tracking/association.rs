@@ -75,6 +75,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::tracking::WheelFronts;
     use crate::tracking::axis::AxisMeasurement;
     use crate::tracking::road_filter::Span;
 
@@ -84,8 +85,14 @@ mod tests {
 
     fn measurement(s_m: f64, d_m: f64) -> Measurement {
         let axis = |position_m| AxisMeasurement { position_m, white_sd_m: 0.5, slow_sd_m: 0.0, time_offset_s: 0.0 };
-        let seen =
-            Span { is_cut: false, is_face: true, along_m: [s_m; 2], across_m: [d_m; 2], spacing_m: [f64::INFINITY; 2] };
+        let seen = Span {
+            is_cut: false,
+            is_face: true,
+            along_m: [s_m; 2],
+            across_m: [d_m; 2],
+            spacing_m: [f64::INFINITY; 2],
+            wheels: WheelFronts::NONE,
+        };
         Measurement { along: axis(s_m), across: axis(d_m), is_part: false, knows_middle: true, seen }
     }
 

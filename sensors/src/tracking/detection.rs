@@ -35,11 +35,53 @@ pub struct SeenPart {
     /// Spacing of the columns on the side at the rearmost and at the foremost point (m), infinite
     /// if no side is seen.
     pub spacing_m: [f64; 2],
+    /// The fronts of its wheels.
+    pub wheels: WheelFronts,
+}
+
+/// The fronts of the wheels of a vehicle that a scan shows, from the first axle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WheelFronts {
+    /// Distances along the box's heading ahead of the face (m).
+    along_m: [f64; Self::MOST],
+    count: usize,
+}
+
+impl WheelFronts {
+    /// Greatest number of fronts: more are left out.
+    pub const MOST: usize = 8;
+    /// No wheels.
+    pub(crate) const NONE: Self = Self { along_m: [0.0; Self::MOST], count: 0 };
+
+    /// Adds the front of a wheel behind the others.
+    pub(crate) fn add(&mut self, along_m: f64) {
+        if let Some(free_m) = self.along_m.get_mut(self.count) {
+            *free_m = along_m;
+            self.count += 1;
+        }
+    }
+
+    /// Returns the distances along the box's heading ahead of the face (m).
+    pub fn along_m(&self) -> &[f64] {
+        &self.along_m[..self.count]
+    }
+
+    /// Returns the same fronts, as distances from another point: `offset_m` is added to each.
+    pub(crate) fn shifted(mut self, offset_m: f64) -> Self {
+        self.along_m[..self.count].iter_mut().for_each(|along_m| *along_m += offset_m);
+        self
+    }
 }
 
 impl SeenPart {
     /// A face of unknown extent.
-    pub const FACE: Self = Self { is_cut: false, along_m: [0.0; 2], across_m: [0.0; 2], spacing_m: [f64::INFINITY; 2] };
+    pub const FACE: Self = Self {
+        is_cut: false,
+        along_m: [0.0; 2],
+        across_m: [0.0; 2],
+        spacing_m: [f64::INFINITY; 2],
+        wheels: WheelFronts::NONE,
+    };
 }
 
 /// The sensor that found a detection.

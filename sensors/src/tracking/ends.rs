@@ -13,6 +13,9 @@
 //! vehicle. Other ends do not: where a layer of beams passes below the load, the end of the visible
 //! part moves over the vehicle.
 //!
+//! The fronts of the wheels of a long vehicle always keep their places. Where wheels are seen, they
+//! alone count.
+//!
 //! [`Ends`] remember the distances of the points behind the followed point. A point measures it
 //! once it has kept its distance for some scans. The estimate does not jump when the visible end
 //! changes. The end of a box would jump if its front or length followed from the visible end of
@@ -38,6 +41,11 @@ const PROVEN_SCANS: u8 = 8;
 /// Least share by which a remembered distance is corrected while the front is seen (assumption).
 const LEARNING_SHARE: f64 = 0.05;
 
+/// Number of wheels that are remembered: those of the longest trucks, one for each group of axles.
+const WHEELS: usize = 6;
+/// Difference up to which two wheels agree (m; assumption): twice the noise of a range.
+const WHEELS_AGREE_M: f64 = 0.1;
+
 /// A point on a vehicle's side as a scan shows it: the end of one of the vehicle's parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SidePoint {
@@ -57,6 +65,10 @@ pub(crate) struct Ends {
     points: [Option<Remembered>; POINTS],
     /// Index of the next point to replace.
     next: usize,
+    /// Distances of the fronts of the wheels behind the followed point (m).
+    wheels_m: [Option<f64>; WHEELS],
+    /// Index of the next wheel to replace.
+    next_wheel: usize,
 }
 
 /// A point on a vehicle's side that was seen before.
@@ -76,7 +88,7 @@ impl Ends {
     pub(crate) const fn new(has_front: bool) -> Self {
         let mut points = [None; POINTS];
         points[0] = Some(Remembered { behind_m: 0.0, scans: PROVEN_SCANS });
-        Self { has_front, rearmost_m: 0.0, points, next: 1 }
+        Self { has_front, rearmost_m: 0.0, points, next: 1, wheels_m: [None; WHEELS], next_wheel: 0 }
     }
 
     /// Moves the followed point ahead by `offset_m`, to the front.
@@ -84,6 +96,63 @@ impl Ends {
         self.has_front = true;
         self.rearmost_m += offset_m;
         self.points.iter_mut().flatten().for_each(|point| point.behind_m += offset_m);
+        self.wheels_m.iter_mut().flatten().for_each(|behind_m| *behind_m += offset_m);
+    }
+
+    /// Lets the followed point be the front of a wheel.
+    pub(crate) fn follow_wheel(&mut self) {
+        self.points = [None; POINTS];
+        self.next = 0;
+        (self.wheels_m[0], self.next_wheel) = (Some(0.0), 1);
+    }
+
+    /// Returns how far ahead of its estimate the followed point is by these wheels, given by their
+    /// distances behind it (m). The estimate has the standard deviation `sd_m`. Returns `None` if
+    /// no wheel was seen before.
+    ///
+    /// Of several wheels, the wheel nearest to the prediction counts, and all wheels that agree
+    /// with it.
+    pub(crate) fn measure_wheels(&mut self, wheels_m: &[f64], sd_m: f64) -> Option<f64> {
+        let offsets_m = wheels_m.iter().filter_map(|&behind_m| Some(*self.wheel(behind_m, sd_m)? - behind_m));
+        let base_m = offsets_m.min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let (mut sum_m, mut count) = (0.0, 0.0);
+        for &behind_m in wheels_m {
+            if let Some(remembered_m) = self.wheel(behind_m + base_m, 0.0) {
+                (sum_m, count) = (sum_m + *remembered_m - behind_m, count + 1.0);
+            }
+        }
+        // The remembered wheel that gives the base is one of them.
+        let offset_m = sum_m / count;
+        for &behind_m in wheels_m {
+            if self.wheel(behind_m + offset_m, 0.0).is_none() {
+                self.remember_wheel(behind_m + offset_m);
+            }
+        }
+        Some(offset_m)
+    }
+
+    /// Learns the distances of these wheels behind the followed point (m), which is `offset_m` ahead of
+    /// its estimate.
+    pub(crate) fn learn_wheels(&mut self, wheels_m: &[f64], offset_m: f64) {
+        for &behind_m in wheels_m {
+            match self.wheel(behind_m + offset_m, 0.0) {
+                Some(remembered_m) => *remembered_m += LEARNING_SHARE * (behind_m + offset_m - *remembered_m),
+                None => self.remember_wheel(behind_m + offset_m),
+            }
+        }
+    }
+
+    fn remember_wheel(&mut self, behind_m: f64) {
+        self.wheels_m[self.next_wheel] = Some(behind_m);
+        self.next_wheel = (self.next_wheel + 1) % WHEELS;
+    }
+
+    /// Returns the remembered wheel nearest to a wheel, if it may be the same.
+    fn wheel(&mut self, behind_m: f64, sd_m: f64) -> Option<&mut f64> {
+        let limit_m = (WHEELS_AGREE_M + 2.0 * sd_m).min(MAX_SAME_POINT_M);
+        let off_m = |remembered_m: &f64| (remembered_m - behind_m).abs();
+        let nearest = self.wheels_m.iter_mut().flatten().min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        nearest.filter(|nearest| off_m(nearest) <= limit_m)
     }
 
     /// Returns how far ahead of its estimate the followed point is by these points, and the spacing
@@ -120,9 +189,11 @@ impl Ends {
         (weights > 0.0).then(|| [sum / weights, least_m])
     }
 
-    /// Learns the distances of these points while the front is seen.
-    pub(crate) fn learn(&mut self, points: &[SidePoint]) {
+    /// Learns the distances of these points while the front or a wheel is seen. The followed point is
+    /// `offset_m` ahead of its estimate.
+    pub(crate) fn learn(&mut self, points: &[SidePoint], offset_m: f64) {
         for point in points {
+            let point = &SidePoint { behind_m: point.behind_m + offset_m, ..*point };
             let Some(remembered) = self.nearest(point, 0.0) else {
                 self.remember(point);
                 continue;
@@ -184,9 +255,31 @@ mod tests {
     #[test]
     fn a_point_that_disagrees_with_the_prediction_counts_for_nothing_beside_one_that_agrees() {
         let mut ends = Ends::new(true);
-        (0..=PROVEN_SCANS).for_each(|_| ends.learn(&points([3.0, 9.0])));
+        (0..=PROVEN_SCANS).for_each(|_| ends.learn(&points([3.0, 9.0]), 0.0));
         let [offset_m, _] = ends.measure(&points([2.98, 9.2]), 0.1).unwrap();
         assert!((offset_m - 0.02).abs() < 1e-9, "{offset_m}");
+    }
+
+    #[test]
+    fn wheels_measure_from_their_second_scan_on_and_refuse_one_that_disagrees() {
+        let mut ends = Ends::new(true);
+        assert_eq!(ends.measure_wheels(&[2.0, 12.0], 0.1), None);
+        ends.learn_wheels(&[2.0, 12.0], 0.0);
+        let offset_m = ends.measure_wheels(&[1.96, 11.94], 0.1).unwrap();
+        assert!((offset_m - 0.05).abs() < 1e-9, "{offset_m}");
+        // The nearest to the prediction counts, and the other becomes a wheel of its own.
+        let offset_m = ends.measure_wheels(&[1.98, 12.25], 0.1).unwrap();
+        assert!((offset_m - 0.02).abs() < 1e-9, "{offset_m}");
+        let offset_m = ends.measure_wheels(&[12.27], 0.0).unwrap();
+        assert!(offset_m.abs() < 1e-9, "{offset_m}");
+    }
+
+    #[test]
+    fn one_wheel_that_two_fronts_resemble_gives_a_finite_offset() {
+        let mut ends = Ends::new(false);
+        ends.follow_wheel();
+        let offset_m = ends.measure_wheels(&[0.3, -0.2, 0.25], 0.5).unwrap();
+        assert!((offset_m - 0.2).abs() < 0.1, "{offset_m}");
     }
 
     #[test]

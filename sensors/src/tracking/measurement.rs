@@ -83,6 +83,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
             along_m: detection.seen.along_m.map(|along_m| s_m + along_m),
             across_m: detection.seen.across_m.map(|across_m| d_m + across_m),
             spacing_m: detection.seen.spacing_m,
+            wheels: detection.seen.wheels.shifted(s_m),
         },
     }
 }

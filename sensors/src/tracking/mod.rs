@@ -37,7 +37,7 @@ mod view;
 
 pub use box_use::{BoxRole, BoxUse, Innovation};
 pub use config::{DETECTION_PROBABILITY, MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
-pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy, SeenPart};
+pub use detection::{Detection, Extent, SIDE_PROTRUSION_M, SeenBy, SeenPart, WheelFronts};
 pub use gaussian::Gaussian;
 pub use lane::LaneGeometry;
 pub use radar::{RadarDetection, RadarScan};

@@ -8,6 +8,7 @@
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
 use super::box_use::Innovation;
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
+use crate::tracking::WheelFronts;
 use crate::tracking::gaussian::Gaussian;
 use closecall_traffic::ego_frame::EgoFrame;
 use closecall_traffic::maths;
@@ -74,6 +75,8 @@ pub(crate) struct Span {
     pub(crate) across_m: [f64; 2],
     /// Spacing of the columns on the side at these two points (m), infinite if no side is seen.
     pub(crate) spacing_m: [f64; 2],
+    /// The fronts of its wheels, as positions along the road (m).
+    pub(crate) wheels: WheelFronts,
 }
 
 impl Measurement {
@@ -234,6 +237,13 @@ impl RoadFilter {
     pub(crate) fn shift_along(&mut self, offset_m: f64, variance_m2: f64) {
         self.along.shift(offset_m, variance_m2);
         self.followed[0].age_s = f64::INFINITY;
+    }
+
+    /// Moves the centre across the road by `offset_m`, which is known with the variance
+    /// `variance_m2`.
+    pub(crate) fn shift_across(&mut self, offset_m: f64, variance_m2: f64) {
+        self.across.shift(offset_m, variance_m2);
+        self.followed[1].age_s = f64::INFINITY;
     }
 
     /// Returns whether the measurement of a sensor along or across the road counts. It counts if it

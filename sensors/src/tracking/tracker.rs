@@ -50,6 +50,9 @@ const SPAN_SD_M: f64 = 0.5;
 /// Standard deviation of the speed beyond which a track is lost whose front is unknown (m/s;
 /// assumption).
 const LOST_SPEED_SD_MPS: f64 = 3.0;
+/// Greatest width of the wheels on one side of a truck (m; assumption), which are taken for a motorcycle
+/// if nothing else is seen.
+const WIDEST_WHEEL_M: f64 = 1.0;
 /// Greatest distance between two axles of a truck, between which nothing else may be seen (m;
 /// assumption).
 const WHEELS_APART_M: f64 = 8.0;
@@ -75,9 +78,12 @@ const SAME_SIDE_M: f64 = 0.3;
 /// Slow standard deviation of a front or a centre that follows from a side (m; assumption): wheels,
 /// guards and panels lie within 0.1 m.
 const SIDE_SLOW_SD_M: f64 = 0.1;
+/// Error of the front of a wheel as a spacing of columns (m; assumption): it faces the sensor, so
+/// that the noise of the ranges alone matters.
+const WHEEL_SPACING_M: f64 = 0.1;
 /// Difference up to which the nearer side of a vehicle shows its centre (m; assumption): beyond it,
 /// it is a part on the far side.
-const SIDE_GATE_M: f64 = 0.7;
+const SIDE_GATE_M: f64 = 0.5;
 /// Standard deviation of the length of a vehicle whose front has not been in view (m; assumption),
 /// by class: trucks are 7 to 19 m long.
 const LENGTH_SD_M: [f64; 3] = [0.5, 4.0, 0.2];
@@ -151,7 +157,7 @@ impl TrackState {
         let ([along, across], [tail_along, tail_across]) = (self.filter.estimate(), other.filter.estimate());
         let behind_m = along.position_m - tail_along.position_m;
         self.ends.has_front
-            && self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE
+            && self.is_truck()
             && other.lifecycle.existence() < LEAST_TAIL_EXISTENCE
             && (0.0..=LONGEST_TRUCK_M).contains(&behind_m)
             && (tail_across.position_m - across.position_m).abs() <= self.half_width_m()
@@ -166,20 +172,20 @@ impl TrackState {
 
     /// Returns whether something seen belongs to this vehicle: it overlaps the track's box along
     /// and across the road.
-    fn covers(&self, measurement: &Measurement, ego_d_m: f64) -> bool {
+    fn covers(&self, measurement: &Measurement) -> bool {
         let [along, across] = self.filter.estimate();
         let seen = &measurement.seen;
         let [rear_m, front_m] = self.span_m();
         let [seen_rear_m, seen_front_m] =
             seen.along_m.map(|s_m| s_m - measurement.along.time_offset_s * along.speed_mps);
         let [right_m, left_m] = seen.across_m.map(|d_m| d_m - across.position_m);
-        let rear_m = if seen.is_face { rear_m } else { rear_m - self.beyond_m() };
-        // If only a part of a vehicle is seen, it may be a truck.
-        let half_width_m = self.half_width_m();
-        let far_m = if self.ends.has_front { half_width_m } else { half_width_m + MAX_WIDER_M };
-        let [to_right_m, to_left_m] =
-            if across.position_m > ego_d_m { [half_width_m, far_m] } else { [far_m, half_width_m] };
-        seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
+        // The wheels of a truck are as wide as a motorcycle.
+        let may_be_wheel = left_m - right_m <= WIDEST_WHEEL_M && self.ends.has_front && self.is_truck();
+        let rear_m = if seen.is_face && !may_be_wheel { rear_m } else { rear_m - self.beyond_m() };
+        // If only a part of a vehicle is seen, it may be a truck, and its frame may be seen before its
+        // wheels.
+        let aside_m = self.half_width_m() + if self.ends.has_front { 0.0 } else { MAX_WIDER_M };
+        seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= aside_m && left_m >= -aside_m
     }
 
     /// Returns the positions along the road between which parts of the vehicle lie (m). A front
@@ -198,14 +204,24 @@ impl TrackState {
     /// Returns the largest distance behind the track's box at which parts of the vehicle may be
     /// seen (m). Such a part is the wheel of a trailer when the beams pass below the trailer.
     fn beyond_m(&self) -> f64 {
-        let is_truck = self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE;
-        let may_be_long = is_truck || !self.ends.has_front;
+        let may_be_long = self.is_truck() || !self.ends.has_front;
         if may_be_long { (LONGEST_TRUCK_M - self.size_m().0).max(0.0) } else { 0.0 }
     }
 
     /// Returns half of the width within which parts of the vehicle lie (m).
     fn half_width_m(&self) -> f64 {
         0.5 * self.size_m().1.max(MIN_WHOLE_WIDTH_M) + SIDE_PROTRUSION_M
+    }
+
+    /// Returns whether the vehicle is surely a truck.
+    fn is_truck(&self) -> bool {
+        self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE
+    }
+
+    /// Returns whether the wheels of the vehicle tell how it moves: it is a truck, or its front is out of
+    /// view.
+    fn follows_wheels(&self) -> bool {
+        self.is_truck() || !self.ends.has_front
     }
 
     /// Returns whether speed and kind of the vehicle are known well enough to confirm the track. A
@@ -268,6 +284,8 @@ pub struct Tracker {
     owners: Vec<Option<usize>>,
     /// The points on the side of the track that is corrected.
     side_points: Vec<SidePoint>,
+    /// The distances of its wheels behind its followed point (m).
+    wheels_m: Vec<f64>,
     faces: Vec<Option<Face>>,
     /// What has become of the boxes of the latest update.
     uses: Vec<BoxUse>,
@@ -287,6 +305,7 @@ impl Tracker {
             assigned: Vec::with_capacity(RESERVED),
             owners: Vec::with_capacity(RESERVED),
             side_points: Vec::with_capacity(RESERVED),
+            wheels_m: Vec::with_capacity(RESERVED),
             faces: Vec::with_capacity(RESERVED),
             uses: Vec::with_capacity(RESERVED),
             first_use: 0,
@@ -361,7 +380,7 @@ impl Tracker {
         let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0, track.ends.has_front));
         assign(tracks, &self.measurements, &mut self.assignment, &mut self.assigned);
         self.project_faces(&scan.view, &frame);
-        self.find_owners(scan.ego.d_m);
+        self.find_owners();
         self.release_false_fronts(scan);
         self.begin_uses(scan);
         for track_index in 0..self.tracks.len() {
@@ -443,7 +462,8 @@ impl Tracker {
         track.class.update(&detection.class, detection.points);
         self.find_side_points(track_index, Some(detection_index), scan.ego.d_m);
         let track = &mut self.tracks[track_index];
-        track.ends.learn(&self.side_points);
+        track.ends.learn(&self.side_points, 0.0);
+        track.ends.learn_wheels(&self.wheels_m, 0.0);
         let of_track = self.owners.iter().zip(&self.measurements).filter(|(owner, _)| **owner == Some(track_index));
         let parts = of_track.map(|(_, part)| part).chain([&self.measurements[detection_index]]);
         track.span(0.0, parts);
@@ -453,11 +473,11 @@ impl Tracker {
 
     /// Finds, for each detection without a track, the track whose vehicle it is a part of: the
     /// earliest one that covers it.
-    fn find_owners(&mut self, ego_d_m: f64) {
+    fn find_owners(&mut self) {
         self.owners.clear();
         for (detection_index, measurement) in self.measurements.iter().enumerate() {
             let is_free = measurement.is_finite() && !self.assigned.contains(&Some(detection_index));
-            let owner = self.tracks.iter().position(|track| is_free && track.covers(measurement, ego_d_m));
+            let owner = self.tracks.iter().position(|track| is_free && track.covers(measurement));
             self.owners.push(owner);
         }
     }
@@ -481,28 +501,38 @@ impl Tracker {
     }
 
     /// Lists the ends of a track's parts, and of the detection that it is assigned, on the side
-    /// that faces the ego.
+    /// that faces the ego, and their wheels on both sides.
     ///
     /// Parts on the far side, seen below the vehicle, end where something nearer hides them: such
     /// an end is no point of the vehicle.
     fn find_side_points(&mut self, track_index: usize, assigned: Option<usize>, ego_d_m: f64) {
         let mut points = std::mem::take(&mut self.side_points);
+        let mut wheels_m = std::mem::take(&mut self.wheels_m);
         points.clear();
+        wheels_m.clear();
         let [along, across] = self.tracks[track_index].filter.estimate();
         let is_left = across.position_m > ego_d_m;
         let parts =
             || self.parts(track_index).map(|(_, part)| part).chain(assigned.map(|index| &self.measurements[index]));
         let nearest_m = parts().map(|part| near_side_m(part, is_left)).fold(f64::INFINITY, f64::min);
-        for part in parts().filter(|part| near_side_m(part, is_left) <= nearest_m + SAME_SIDE_M) {
+        let follows_wheels = self.tracks[track_index].follows_wheels();
+        for part in parts() {
+            let behind_m = |s_m: f64| along.position_m - (s_m - part.along.time_offset_s * along.speed_mps);
+            if follows_wheels {
+                wheels_m.extend(part.seen.wheels.along_m().iter().map(|&front_m| behind_m(front_m)));
+            }
+            if near_side_m(part, is_left) > nearest_m + SAME_SIDE_M {
+                continue;
+            }
             let ends = part.seen.along_m.into_iter().zip(part.seen.spacing_m).enumerate();
             for (end, (s_m, spacing_m)) in ends {
                 // The foremost point of a part that is cut off is the edge of the field of view.
                 if spacing_m <= MAX_SPACING_M && !(end == 1 && part.seen.is_cut) {
-                    let now_m = s_m - part.along.time_offset_s * along.speed_mps;
-                    points.push(SidePoint { behind_m: along.position_m - now_m, spacing_m });
+                    points.push(SidePoint { behind_m: behind_m(s_m), spacing_m });
                 }
             }
         }
+        self.wheels_m = wheels_m;
         self.side_points = points;
     }
 
@@ -551,6 +581,12 @@ impl Tracker {
         let sensor = Some(scan.sensor);
         if let Some((side_m, time_offset_s)) = nearest {
             let position_m = if is_left { side_m + half_width_m } else { -side_m - half_width_m };
+            let offset_m = position_m - across.position_m;
+            // Something nearer than the parts that were seen first is the vehicle's side.
+            let is_nearer = (offset_m < 0.0) == is_left && offset_m.abs() > SIDE_GATE_M;
+            if is_nearer && !track.ends.has_front {
+                track.filter.shift_across(offset_m, SIDE_SD_M * SIDE_SD_M);
+            }
             if (position_m - across.position_m).abs() <= SIDE_GATE_M {
                 let (white_sd_m, slow_sd_m) = (SIDE_SD_M, SIDE_SLOW_SD_M);
                 let measured = AxisMeasurement { position_m, white_sd_m, slow_sd_m, time_offset_s };
@@ -560,7 +596,15 @@ impl Tracker {
         // A part of the vehicle is ahead of its assumed front.
         let sd_m = along.position_variance_m2.sqrt();
         track.ends.has_front &= !has_cut || front_m - along.position_m <= FRONT_MARGIN_M + 3.0 * sd_m;
-        let measured = track.ends.measure(&self.side_points, sd_m);
+        let by_wheels = track.ends.measure_wheels(&self.wheels_m, sd_m);
+        let measured = if let Some(offset_m) = by_wheels {
+            track.ends.learn(&self.side_points, offset_m);
+            Some([offset_m, WHEEL_SPACING_M])
+        } else {
+            let measured = track.ends.measure(&self.side_points, sd_m);
+            track.ends.learn_wheels(&self.wheels_m, measured.map_or(0.0, |[offset_m, _]| offset_m));
+            measured
+        };
         if let Some([offset_m, spacing_m]) = measured {
             let measured = AxisMeasurement {
                 position_m: along.position_m + offset_m,
@@ -634,8 +678,10 @@ impl Tracker {
         let (s_m, d_m) = (measurement.along.position_m, measurement.across.position_m);
         let seen = &measurement.seen;
         let is_taken = self.assigned.contains(&Some(detection_index))
-            || self.tracks.iter().any(|track| track.contains(s_m, d_m) || track.covers(measurement, scan.ego.d_m));
-        if is_taken || !measurement.is_finite() || seen.is_cut && seen.spacing_m[0] > MAX_SPACING_M {
+            || self.tracks.iter().any(|track| track.contains(s_m, d_m) || track.covers(measurement));
+        let wheel_m = rearmost_wheel_m(measurement);
+        let is_coarse = wheel_m.is_none() && seen.spacing_m[0] > MAX_SPACING_M;
+        if is_taken || !measurement.is_finite() || seen.is_cut && is_coarse {
             return;
         }
         let has_front = !seen.is_cut && (seen.is_face || seen.spacing_m[0] > NEAR_SPACING_M);
@@ -654,6 +700,11 @@ impl Tracker {
         };
         if has_front {
             track.extent.update(detection);
+        } else {
+            track.ends.rearmost_m = measurement.along.position_m - measurement.seen.along_m[0];
+            if wheel_m.is_some() {
+                track.ends.follow_wheel();
+            }
         }
         track.class.update(&detection.class, detection.points);
         let used = &mut self.uses[self.first_use + detection_index];
@@ -690,12 +741,22 @@ fn followed_sensor(detection: &Detection, scan: &TrackerScan<'_>) -> Option<usiz
     (detection.seen_by == SeenBy::Lidar).then_some(scan.sensor)
 }
 
-/// Returns the measurement of the rear end of a vehicle whose front is out of view.
+/// Returns the position along the road of the rearmost wheel of a part that is longer than a car (m).
+fn rearmost_wheel_m(part: &Measurement) -> Option<f64> {
+    let [rear_m, front_m] = part.seen.along_m;
+    part.seen.wheels.along_m().last().copied().filter(|_| front_m - rear_m > LONGEST_CAR_M)
+}
+
+/// Returns the measurement of the rearmost point of a vehicle whose front is out of view: of a wheel, or
+/// else of its rear end.
 fn of_rear(measurement: &Measurement) -> Measurement {
-    let Measurement { along, across, seen, .. } = *measurement;
-    let white_sd_m = maths::hypot(SIDE_SD_M, SIDE_SD_COLUMNS * seen.spacing_m[0]);
-    let along = AxisMeasurement { position_m: seen.along_m[0], white_sd_m, slow_sd_m: SIDE_SLOW_SD_M, ..along };
-    Measurement { along, across, ..*measurement }
+    let [position_m, spacing_m] = match rearmost_wheel_m(measurement) {
+        Some(wheel_m) => [wheel_m, WHEEL_SPACING_M],
+        None => [measurement.seen.along_m[0], measurement.seen.spacing_m[0]],
+    };
+    let white_sd_m = maths::hypot(SIDE_SD_M, SIDE_SD_COLUMNS * spacing_m);
+    let along = AxisMeasurement { position_m, white_sd_m, slow_sd_m: SIDE_SLOW_SD_M, ..measurement.along };
+    Measurement { along, ..*measurement }
 }
 
 /// Returns the position across the road of the side of a part that faces the ego (m), with the sign

@@ -25,6 +25,7 @@ fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
             along_m: [s_m; 2],
             across_m: [d_m; 2],
             spacing_m: [f64::INFINITY; 2],
+            wheels: WheelFronts::NONE,
         },
     }
 }
