@@ -54,8 +54,8 @@ const SIDE_SEEN_M: f64 = 3.0;
 /// (m).
 const SIDE_SPACING_M: f64 = 0.5;
 
-/// Distance of a vehicle up to which its wheels are searched (m; assumption): farther away, one beam
-/// or none is below their hubs.
+/// Distance of a vehicle up to which its wheels are searched (m; assumption): farther away, few beams
+/// meet them below cab and guards.
 const WHEELS_REACH_M: f64 = 25.0;
 
 /// The detector of the rear LiDAR. It keeps no state from scan to scan except allocated memory.
@@ -92,7 +92,7 @@ impl Detector {
             parents: Vec::with_capacity(RESERVED_CLUSTERS),
             is_pair: Vec::with_capacity(RESERVED_CLUSTERS),
             detections: Vec::with_capacity(RESERVED_CLUSTERS),
-            low: Vec::new(),
+            low: Vec::with_capacity(points),
         }
     }
 

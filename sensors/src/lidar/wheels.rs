@@ -42,7 +42,7 @@ pub(super) fn wheel_fronts(fit: &BoxFit, members: &[u32], scan: &LidarScan, low:
         [x * cos + y * sin, y * cos - x * sin]
     }));
     // From the front to the rear.
-    low.sort_unstable_by(|a, b| b[0].total_cmp(&a[0]));
+    low.sort_unstable_by(|a, b| b[0].total_cmp(&a[0]).then(b[1].total_cmp(&a[1])));
     let mut fronts = WheelFronts::NONE;
     let mut rest = &low[..];
     while let [[front_m, _], behind @ ..] = rest {
@@ -50,7 +50,8 @@ pub(super) fn wheel_fronts(fit: &BoxFit, members: &[u32], scan: &LidarScan, low:
         let face = &rest[..within(FACE_DEPTH_M)];
         let width_m = width_m(face);
         rest = if width_m > FACE_WIDTH_M[1] {
-            &rest[face.len()..]
+            // A bumper, with the noise behind it.
+            &rest[within(LEAST_APART_M)..]
         } else if width_m >= FACE_WIDTH_M[0] && face.len() >= LEAST_POINTS {
             fronts.add(face.iter().map(|[along_m, _]| along_m).sum::<f64>() / face.len() as f64);
             &rest[within(LEAST_APART_M)..]

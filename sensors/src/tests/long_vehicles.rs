@@ -152,8 +152,8 @@ fn a_truck_that_passes_or_is_passed_is_one_track_with_its_speed_and_class() {
 
 #[test]
 fn trucks_of_every_shape_are_one_track() {
-    // A tank, a platform and a coach have no panels like those of a trailer: their wheels tell how they
-    // move. Of a shorter truck beside the ego, too little is seen.
+    // The ends of a tank or a platform seem to move: the wheels tell how the vehicle moves. Of a
+    // shorter truck beside the ego, too little is seen.
     let lengths = |shape: &BodyShape| (*shape, shape.usual_dimensions().length_m.max(12.0));
     let usual = BodyShape::of_class(VehicleClass::Truck).iter().map(lengths);
     assert_one_track(&in_both_lanes(usual.filter(|(shape, _)| *shape != BodyShape::TarpaulinTrailer)));
@@ -180,4 +180,59 @@ fn trucks_of_other_lengths_speeds_and_offsets_are_one_track_too() {
         cases.push(Passing { shape, length_m, left_m, faster_mps, front_m, seconds });
     }
     assert_one_track(&cases);
+}
+
+/// Returns two counts of faults over the last 25 steps, with a follower of this class behind the
+/// ego and a truck beside the ego, `aside_m` to its left: the follower has no confirmed track of its
+/// own or several, and a confirmed track is where neither vehicle is.
+fn beside_a_truck(follower: VehicleClass, aside_m: f64, offset_m: f64, sample: u64) -> [usize; 2] {
+    let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
+    let actors = [].into();
+    let mut perception =
+        sensors.build(&NoiseKey { seed: 11, sample, ego: ActorId::new("ego").unwrap(), actors }).unwrap();
+    let road = Road::straight(3);
+    let own_m = OWN_LANE_M;
+    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, own_m), EGO_MPS);
+    let rear_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m;
+    let mut truck = scene_vehicle(1, VehicleClass::Truck, rear_m + 3.0 - 9.0, own_m + aside_m);
+    truck.vehicle.dimensions.length_m = 18.0;
+    let mut behind = scene_vehicle(2, follower, rear_m - 10.0, own_m + offset_m);
+    let mut wrong = [0; 2];
+    for index in 0..75 {
+        for vehicle in [&mut truck, &mut behind] {
+            vehicle.state.speed_mps = EGO_MPS;
+        }
+        let others = [truck, behind];
+        let scene = Scene {
+            time: CONTROL_STEP * index,
+            road: &road,
+            environment: &Environment::CLEAR_DAY,
+            ego,
+            others: &others,
+        };
+        let tracks = perception.step(&scene).unwrap();
+        let confirmed =
+            tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative);
+        if index >= 50 {
+            let y_m: Vec<f64> = confirmed.map(|track| track.state[1]).collect();
+            wrong[0] += y_m.iter().filter(|y_m| (*y_m - offset_m).abs() <= 0.3).count().abs_diff(1);
+            wrong[1] += y_m.iter().filter(|y_m| (*y_m - offset_m).abs() > 0.3 && (*y_m - aside_m).abs() > 0.3).count();
+        }
+        for vehicle in [&mut ego, &mut truck, &mut behind] {
+            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
+        }
+    }
+    wrong
+}
+
+#[test]
+fn a_follower_beside_a_truck_whose_front_is_out_of_view_keeps_its_own_track() {
+    for (follower, aside_m, offset_m) in [
+        (VehicleClass::Truck, 3.75, 0.35),
+        (VehicleClass::Car, 3.5, 0.4),
+        (VehicleClass::Motorcycle, 3.5, 1.2),
+        (VehicleClass::Truck, 3.25, 0.1),
+    ] {
+        assert_eq!(beside_a_truck(follower, aside_m, offset_m, 0), [0, 0], "{follower:?} {aside_m} {offset_m}");
+    }
 }

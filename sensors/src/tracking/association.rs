@@ -92,6 +92,7 @@ mod tests {
             across_m: [d_m; 2],
             spacing_m: [f64::INFINITY; 2],
             wheels: WheelFronts::NONE,
+            top_m: 1.5,
         };
         Measurement { along: axis(s_m), across: axis(d_m), is_part: false, knows_middle: true, seen }
     }

@@ -13,13 +13,14 @@
 //! vehicle. Other ends do not: where a layer of beams passes below the load, the end of the visible
 //! part moves over the vehicle.
 //!
-//! The fronts of the wheels of a long vehicle always keep their places. Where wheels are seen, they
-//! alone count.
+//! The fronts of the wheels keep their places. Where known wheels are seen, they alone count.
 //!
 //! [`Ends`] remember the distances of the points behind the followed point. A point measures it
 //! once it has kept its distance for some scans. The estimate does not jump when the visible end
 //! changes. The end of a box would jump if its front or length followed from the visible end of
 //! each scan.
+
+use super::detection::WheelFronts;
 
 /// Number of distances that are remembered: the ends of cab, load, guard and wheels (assumption).
 const POINTS: usize = 8;
@@ -41,8 +42,8 @@ const PROVEN_SCANS: u8 = 8;
 /// Least share by which a remembered distance is corrected while the front is seen (assumption).
 const LEARNING_SHARE: f64 = 0.05;
 
-/// Number of wheels that are remembered: those of the longest trucks, one for each group of axles.
-const WHEELS: usize = 6;
+/// Number of wheels that are remembered.
+const WHEELS: usize = WheelFronts::MOST;
 /// Difference up to which two wheels agree (m; assumption): twice the noise of a range.
 const WHEELS_AGREE_M: f64 = 0.1;
 
@@ -69,6 +70,8 @@ pub(crate) struct Ends {
     wheels_m: [Option<f64>; WHEELS],
     /// Index of the next wheel to replace.
     next_wheel: usize,
+    /// Number of latest scans in a row with a part that is nearer to the ego than the known side.
+    nearer_scans: u8,
 }
 
 /// A point on a vehicle's side that was seen before.
@@ -88,7 +91,7 @@ impl Ends {
     pub(crate) const fn new(has_front: bool) -> Self {
         let mut points = [None; POINTS];
         points[0] = Some(Remembered { behind_m: 0.0, scans: PROVEN_SCANS });
-        Self { has_front, rearmost_m: 0.0, points, next: 1, wheels_m: [None; WHEELS], next_wheel: 0 }
+        Self { has_front, rearmost_m: 0.0, points, next: 1, wheels_m: [None; WHEELS], next_wheel: 0, nearer_scans: 0 }
     }
 
     /// Moves the followed point ahead by `offset_m`, to the front.
@@ -131,8 +134,24 @@ impl Ends {
         Some(offset_m)
     }
 
-    /// Learns the distances of these wheels behind the followed point (m), which is `offset_m` ahead of
-    /// its estimate.
+    /// Returns whether wheels of the vehicle are known.
+    pub(crate) fn has_wheels(&self) -> bool {
+        self.wheels_m.iter().any(Option::is_some)
+    }
+
+    /// Counts a scan whose nearest part is nearer to the ego than the known side. Returns whether
+    /// this part is the vehicle's side: it has been seen in some scans in a row.
+    pub(crate) fn is_side_proven(&mut self, is_nearer: bool) -> bool {
+        self.nearer_scans = if is_nearer { self.nearer_scans + 1 } else { 0 };
+        let is_proven = self.nearer_scans >= PROVEN_SCANS;
+        if is_proven {
+            self.nearer_scans = 0;
+        }
+        is_proven
+    }
+
+    /// Learns the distances of these wheels behind the followed point (m). The followed point is
+    /// `offset_m` ahead of its estimate.
     pub(crate) fn learn_wheels(&mut self, wheels_m: &[f64], offset_m: f64) {
         for &behind_m in wheels_m {
             match self.wheel(behind_m + offset_m, 0.0) {
@@ -189,8 +208,8 @@ impl Ends {
         (weights > 0.0).then(|| [sum / weights, least_m])
     }
 
-    /// Learns the distances of these points while the front or a wheel is seen. The followed point is
-    /// `offset_m` ahead of its estimate.
+    /// Learns the distances of these points while the front or a wheel is seen. The followed point
+    /// is `offset_m` ahead of its estimate.
     pub(crate) fn learn(&mut self, points: &[SidePoint], offset_m: f64) {
         for point in points {
             let point = &SidePoint { behind_m: point.behind_m + offset_m, ..*point };

@@ -84,6 +84,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
             across_m: detection.seen.across_m.map(|across_m| d_m + across_m),
             spacing_m: detection.seen.spacing_m,
             wheels: detection.seen.wheels.shifted(s_m),
+            top_m: detection.top_m,
         },
     }
 }

@@ -77,6 +77,8 @@ pub(crate) struct Span {
     pub(crate) spacing_m: [f64; 2],
     /// The fronts of its wheels, as positions along the road (m).
     pub(crate) wheels: WheelFronts,
+    /// Height of the highest point (m).
+    pub(crate) top_m: f64,
 }
 
 impl Measurement {

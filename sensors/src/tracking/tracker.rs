@@ -14,7 +14,7 @@ use super::extent::TrackExtent;
 use super::lifecycle::Lifecycle;
 use super::measurement::{SURE_SCORE, measurement};
 use super::motion::EgoRear;
-use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
+use super::road_filter::{Measurement, RoadFilter, Span, in_ego_frame};
 use super::view::{Face, RearView};
 use crate::tracking::{Detection, SIDE_PROTRUSION_M, SeenBy};
 use closecall_traffic::ego_frame::EgoFrame;
@@ -50,9 +50,12 @@ const SPAN_SD_M: f64 = 0.5;
 /// Standard deviation of the speed beyond which a track is lost whose front is unknown (m/s;
 /// assumption).
 const LOST_SPEED_SD_MPS: f64 = 3.0;
-/// Greatest width of the wheels on one side of a truck (m; assumption), which are taken for a motorcycle
-/// if nothing else is seen.
+/// Greatest width of a box around the wheels on one side of a truck (m; assumption). A classifier
+/// may take them for a motorcycle.
 const WIDEST_WHEEL_M: f64 = 1.0;
+/// Greatest height of such a box (m; assumption): the frame above the wheels and half of a footprint,
+/// less than a rider.
+const HIGHEST_WHEEL_M: f64 = 1.4;
 /// Greatest distance between two axles of a truck, between which nothing else may be seen (m;
 /// assumption).
 const WHEELS_APART_M: f64 = 8.0;
@@ -81,8 +84,11 @@ const SIDE_SLOW_SD_M: f64 = 0.1;
 /// Error of the front of a wheel as a spacing of columns (m; assumption): it faces the sensor, so
 /// that the noise of the ranges alone matters.
 const WHEEL_SPACING_M: f64 = 0.1;
-/// Difference up to which the nearer side of a vehicle shows its centre (m; assumption): beyond it,
-/// it is a part on the far side.
+/// Slow standard deviation of another end on the side of a vehicle whose wheels are known (m;
+/// assumption): it may move over the vehicle.
+const OTHER_END_SLOW_SD_M: f64 = 0.5;
+/// Difference up to which the nearest part of a vehicle shows its side (m; assumption). A part
+/// farther from the ego is on the far side. A part nearer to the ego must be seen in some scans.
 const SIDE_GATE_M: f64 = 0.5;
 /// Standard deviation of the length of a vehicle whose front has not been in view (m; assumption),
 /// by class: trucks are 7 to 19 m long.
@@ -151,8 +157,8 @@ impl TrackState {
         (is_in_box || self.has_tail(other)) && apart_mps < MAX_PART_SPEED_MPS
     }
 
-    /// Returns whether `other` may be the tail of this truck, behind its assumed rear end: what nothing
-    /// shows to be a vehicle, where the longest truck ends.
+    /// Returns whether `other` may be the tail of this truck, behind its assumed rear end. It is
+    /// within the longest truck, and nothing shows that it is another vehicle.
     fn has_tail(&self, other: &Self) -> bool {
         let ([along, across], [tail_along, tail_across]) = (self.filter.estimate(), other.filter.estimate());
         let behind_m = along.position_m - tail_along.position_m;
@@ -172,20 +178,23 @@ impl TrackState {
 
     /// Returns whether something seen belongs to this vehicle: it overlaps the track's box along
     /// and across the road.
-    fn covers(&self, measurement: &Measurement) -> bool {
+    fn covers(&self, measurement: &Measurement, ego: &EgoRear) -> bool {
         let [along, across] = self.filter.estimate();
         let seen = &measurement.seen;
         let [rear_m, front_m] = self.span_m();
         let [seen_rear_m, seen_front_m] =
             seen.along_m.map(|s_m| s_m - measurement.along.time_offset_s * along.speed_mps);
         let [right_m, left_m] = seen.across_m.map(|d_m| d_m - across.position_m);
-        // The wheels of a truck are as wide as a motorcycle.
-        let may_be_wheel = left_m - right_m <= WIDEST_WHEEL_M && self.ends.has_front && self.is_truck();
+        let is_low = seen.top_m <= HIGHEST_WHEEL_M && left_m - right_m <= WIDEST_WHEEL_M;
+        let may_be_wheel = is_low && self.ends.has_front && self.is_truck();
         let rear_m = if seen.is_face && !may_be_wheel { rear_m } else { rear_m - self.beyond_m() };
-        // If only a part of a vehicle is seen, it may be a truck, and its frame may be seen before its
-        // wheels.
-        let aside_m = self.half_width_m() + if self.ends.has_front { 0.0 } else { MAX_WIDER_M };
-        seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= aside_m && left_m >= -aside_m
+        // If the front is out of view, the vehicle may be a truck whose frame was seen first.
+        let half_width_m = self.half_width_m();
+        let wider_m = if self.ends.has_front { half_width_m } else { half_width_m + MAX_WIDER_M };
+        let nearer_m = if !seen.is_face && is_beside_lane(seen, ego) { wider_m } else { half_width_m };
+        let [to_right_m, to_left_m] =
+            if across.position_m > ego.d_m { [nearer_m, wider_m] } else { [wider_m, nearer_m] };
+        seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
     }
 
     /// Returns the positions along the road between which parts of the vehicle lie (m). A front
@@ -218,8 +227,8 @@ impl TrackState {
         self.class.scores().0[VehicleClass::Truck as usize] >= SURE_SCORE
     }
 
-    /// Returns whether the wheels of the vehicle tell how it moves: it is a truck, or its front is out of
-    /// view.
+    /// Returns whether the wheels of the vehicle tell how it moves: it is a truck, or its front is
+    /// out of view.
     fn follows_wheels(&self) -> bool {
         self.is_truck() || !self.ends.has_front
     }
@@ -380,7 +389,7 @@ impl Tracker {
         let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0, track.ends.has_front));
         assign(tracks, &self.measurements, &mut self.assignment, &mut self.assigned);
         self.project_faces(&scan.view, &frame);
-        self.find_owners();
+        self.find_owners(&ego);
         self.release_false_fronts(scan);
         self.begin_uses(scan);
         for track_index in 0..self.tracks.len() {
@@ -390,7 +399,7 @@ impl Tracker {
                 None => self.miss(track_index),
             }
         }
-        self.start_tracks(scan, ego.speed_mps, list);
+        self.start_tracks(scan, &ego, list);
         self.note_parts();
     }
 
@@ -473,11 +482,11 @@ impl Tracker {
 
     /// Finds, for each detection without a track, the track whose vehicle it is a part of: the
     /// earliest one that covers it.
-    fn find_owners(&mut self) {
+    fn find_owners(&mut self, ego: &EgoRear) {
         self.owners.clear();
         for (detection_index, measurement) in self.measurements.iter().enumerate() {
             let is_free = measurement.is_finite() && !self.assigned.contains(&Some(detection_index));
-            let owner = self.tracks.iter().position(|track| is_free && track.covers(measurement));
+            let owner = self.tracks.iter().position(|track| is_free && track.covers(measurement, ego));
             self.owners.push(owner);
         }
     }
@@ -516,9 +525,12 @@ impl Tracker {
             || self.parts(track_index).map(|(_, part)| part).chain(assigned.map(|index| &self.measurements[index]));
         let nearest_m = parts().map(|part| near_side_m(part, is_left)).fold(f64::INFINITY, f64::min);
         let follows_wheels = self.tracks[track_index].follows_wheels();
+        let half_width_m = self.tracks[track_index].half_width_m() + MAX_WIDER_M;
         for part in parts() {
             let behind_m = |s_m: f64| along.position_m - (s_m - part.along.time_offset_s * along.speed_mps);
-            if follows_wheels {
+            let [right_m, left_m] = part.seen.across_m;
+            let is_within = (0.5 * (right_m + left_m) - across.position_m).abs() <= half_width_m;
+            if follows_wheels && is_within {
                 wheels_m.extend(part.seen.wheels.along_m().iter().map(|&front_m| behind_m(front_m)));
             }
             if near_side_m(part, is_left) > nearest_m + SAME_SIDE_M {
@@ -582,12 +594,13 @@ impl Tracker {
         if let Some((side_m, time_offset_s)) = nearest {
             let position_m = if is_left { side_m + half_width_m } else { -side_m - half_width_m };
             let offset_m = position_m - across.position_m;
-            // Something nearer than the parts that were seen first is the vehicle's side.
-            let is_nearer = (offset_m < 0.0) == is_left && offset_m.abs() > SIDE_GATE_M;
-            if is_nearer && !track.ends.has_front {
+            let is_nearer = !track.ends.has_front
+                && (offset_m < 0.0) == is_left
+                && (SIDE_GATE_M..=MAX_WIDER_M + SIDE_GATE_M).contains(&offset_m.abs());
+            if track.ends.is_side_proven(is_nearer) {
                 track.filter.shift_across(offset_m, SIDE_SD_M * SIDE_SD_M);
             }
-            if (position_m - across.position_m).abs() <= SIDE_GATE_M {
+            if offset_m.abs() <= SIDE_GATE_M {
                 let (white_sd_m, slow_sd_m) = (SIDE_SD_M, SIDE_SLOW_SD_M);
                 let measured = AxisMeasurement { position_m, white_sd_m, slow_sd_m, time_offset_s };
                 track.filter.correct_across(&measured, sensor);
@@ -596,11 +609,14 @@ impl Tracker {
         // A part of the vehicle is ahead of its assumed front.
         let sd_m = along.position_variance_m2.sqrt();
         track.ends.has_front &= !has_cut || front_m - along.position_m <= FRONT_MARGIN_M + 3.0 * sd_m;
-        let by_wheels = track.ends.measure_wheels(&self.wheels_m, sd_m);
-        let measured = if let Some(offset_m) = by_wheels {
+        let mut slow_sd_m = SIDE_SLOW_SD_M;
+        let measured = if let Some(offset_m) = track.ends.measure_wheels(&self.wheels_m, sd_m) {
             track.ends.learn(&self.side_points, offset_m);
             Some([offset_m, WHEEL_SPACING_M])
         } else {
+            if track.ends.has_wheels() {
+                slow_sd_m = OTHER_END_SLOW_SD_M;
+            }
             let measured = track.ends.measure(&self.side_points, sd_m);
             track.ends.learn_wheels(&self.wheels_m, measured.map_or(0.0, |[offset_m, _]| offset_m));
             measured
@@ -609,7 +625,7 @@ impl Tracker {
             let measured = AxisMeasurement {
                 position_m: along.position_m + offset_m,
                 white_sd_m: maths::hypot(SIDE_SD_M, SIDE_SD_COLUMNS * spacing_m),
-                slow_sd_m: SIDE_SLOW_SD_M,
+                slow_sd_m,
                 time_offset_s: 0.0,
             };
             track.filter.correct_along(&measured, sensor);
@@ -647,7 +663,7 @@ impl Tracker {
 
     /// Starts a track for each detection that is assigned to no track and does not lie within a
     /// track's box.
-    fn start_tracks(&mut self, scan: &TrackerScan<'_>, ego_mps: f64, list: &mut TrackList) {
+    fn start_tracks(&mut self, scan: &TrackerScan<'_>, ego: &EgoRear, list: &mut TrackList) {
         // A vehicle that the field of view cuts off comes before its parts, and its near side
         // before its far side.
         let nearest_cut = |tracker: &Self, after_m: f64| {
@@ -660,25 +676,25 @@ impl Tracker {
         };
         let mut after_m = f64::NEG_INFINITY;
         while let Some((aside_m, detection_index)) = nearest_cut(self, after_m) {
-            self.start_track(detection_index, scan, ego_mps, list);
+            self.start_track(detection_index, scan, ego, list);
             after_m = aside_m;
         }
         for detection_index in 0..scan.detections.len() {
             if !self.measurements[detection_index].seen.is_cut {
-                self.start_track(detection_index, scan, ego_mps, list);
+                self.start_track(detection_index, scan, ego, list);
             }
         }
     }
 
     /// Starts a track for a detection unless it is assigned to a track or lies within a track's
     /// box.
-    fn start_track(&mut self, detection_index: usize, scan: &TrackerScan<'_>, ego_mps: f64, list: &mut TrackList) {
+    fn start_track(&mut self, detection_index: usize, scan: &TrackerScan<'_>, ego: &EgoRear, list: &mut TrackList) {
         let detection = &scan.detections[detection_index];
         let measurement = &self.measurements[detection_index];
         let (s_m, d_m) = (measurement.along.position_m, measurement.across.position_m);
         let seen = &measurement.seen;
         let is_taken = self.assigned.contains(&Some(detection_index))
-            || self.tracks.iter().any(|track| track.contains(s_m, d_m) || track.covers(measurement));
+            || self.tracks.iter().any(|track| track.contains(s_m, d_m) || track.covers(measurement, ego));
         let wheel_m = rearmost_wheel_m(measurement);
         let is_coarse = wheel_m.is_none() && seen.spacing_m[0] > MAX_SPACING_M;
         if is_taken || !measurement.is_finite() || seen.is_cut && is_coarse {
@@ -688,7 +704,7 @@ impl Tracker {
         let measurement = if has_front { *measurement } else { of_rear(measurement) };
         let mut track = TrackState {
             id: list.new_id(),
-            filter: RoadFilter::new(&measurement, ego_mps, followed_sensor(detection, scan)),
+            filter: RoadFilter::new(&measurement, ego.speed_mps, followed_sensor(detection, scan)),
             lifecycle: match detection.seen_by {
                 SeenBy::Lidar => Lifecycle::first_hit(&self.model.rules),
                 SeenBy::CameraAlone => Lifecycle::first_kept(&self.model.rules),
@@ -741,14 +757,21 @@ fn followed_sensor(detection: &Detection, scan: &TrackerScan<'_>) -> Option<usiz
     (detection.seen_by == SeenBy::Lidar).then_some(scan.sensor)
 }
 
-/// Returns the position along the road of the rearmost wheel of a part that is longer than a car (m).
+/// Returns whether the middle of something seen lies outside of the ego's lane.
+fn is_beside_lane(seen: &Span, ego: &EgoRear) -> bool {
+    let [right_m, left_m] = seen.across_m;
+    (0.5 * (right_m + left_m) - ego.d_m).abs() > ego.half_lane_m
+}
+
+/// Returns the position along the road of the rearmost wheel of a part that is longer than a car
+/// (m).
 fn rearmost_wheel_m(part: &Measurement) -> Option<f64> {
     let [rear_m, front_m] = part.seen.along_m;
     part.seen.wheels.along_m().last().copied().filter(|_| front_m - rear_m > LONGEST_CAR_M)
 }
 
-/// Returns the measurement of the rearmost point of a vehicle whose front is out of view: of a wheel, or
-/// else of its rear end.
+/// Returns the measurement of the rearmost point of a vehicle whose front is out of view: of a
+/// wheel, or else of its rear end.
 fn of_rear(measurement: &Measurement) -> Measurement {
     let [position_m, spacing_m] = match rearmost_wheel_m(measurement) {
         Some(wheel_m) => [wheel_m, WHEEL_SPACING_M],

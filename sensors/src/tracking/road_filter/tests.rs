@@ -26,6 +26,7 @@ fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
             across_m: [d_m; 2],
             spacing_m: [f64::INFINITY; 2],
             wheels: WheelFronts::NONE,
+            top_m: 1.5,
         },
     }
 }
