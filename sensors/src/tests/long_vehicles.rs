@@ -183,8 +183,8 @@ fn trucks_of_other_lengths_speeds_and_offsets_are_one_track_too() {
 }
 
 /// Returns two counts of faults over the last 25 steps, with a follower of this class behind the
-/// ego and a truck beside the ego, `aside_m` to its left: the follower has no confirmed track of its
-/// own or several, and a confirmed track is where neither vehicle is.
+/// ego and a truck beside the ego, `aside_m` to its left. Either the follower has no confirmed track
+/// of its own or several, or a confirmed track is where neither vehicle is.
 fn beside_a_truck(follower: VehicleClass, aside_m: f64, offset_m: f64, sample: u64) -> [usize; 2] {
     let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
     let actors = [].into();

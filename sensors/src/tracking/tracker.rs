@@ -53,8 +53,8 @@ const LOST_SPEED_SD_MPS: f64 = 3.0;
 /// Greatest width of a box around the wheels on one side of a truck (m; assumption). A classifier
 /// may take them for a motorcycle.
 const WIDEST_WHEEL_M: f64 = 1.0;
-/// Greatest height of such a box (m; assumption): the frame above the wheels and half of a footprint,
-/// less than a rider.
+/// Greatest height of such a box (m; assumption): the frame above the wheels and half of a
+/// footprint, less than a rider.
 const HIGHEST_WHEEL_M: f64 = 1.4;
 /// Greatest distance between two axles of a truck, between which nothing else may be seen (m;
 /// assumption).
