@@ -157,7 +157,8 @@ fn trucks_of_every_shape_are_one_track() {
     let lengths = |shape: &BodyShape| (*shape, shape.usual_dimensions().length_m.max(12.0));
     let usual = BodyShape::of_class(VehicleClass::Truck).iter().map(lengths);
     assert_one_track(&in_both_lanes(usual.filter(|(shape, _)| *shape != BodyShape::TarpaulinTrailer)));
-    assert_one_track(&in_both_lanes([(BodyShape::Tanker, 18.0), (BodyShape::PlatformTruck, 25.0)]));
+    let long = [(BodyShape::Tanker, 18.0), (BodyShape::Tanker, 25.0), (BodyShape::PlatformTruck, 25.0)];
+    assert_one_track(&in_both_lanes(long));
 }
 
 #[test]
@@ -234,5 +235,57 @@ fn a_follower_beside_a_truck_whose_front_is_out_of_view_keeps_its_own_track() {
         (VehicleClass::Truck, 3.25, 0.1),
     ] {
         assert_eq!(beside_a_truck(follower, aside_m, offset_m, 0), [0, 0], "{follower:?} {aside_m} {offset_m}");
+    }
+}
+
+/// Returns the number of steps in which a motorcycle has a confirmed track of its own, and the
+/// number of all steps. It follows a truck of 14 m that overtakes the ego in a neighbouring lane.
+fn behind_a_truck(gap_m: f64, left_m: f64, towards_ego_m: f64) -> [usize; 2] {
+    let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
+    let actors = [].into();
+    let mut perception =
+        sensors.build(&NoiseKey { seed: 11, sample: 3, ego: ActorId::new("ego").unwrap(), actors }).unwrap();
+    let road = Road::straight(3);
+    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), EGO_MPS);
+    let rear_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m;
+    let (front_m, truck_m) = (rear_m - 30.0, 14.0);
+    let mut truck = scene_vehicle(1, VehicleClass::Truck, front_m - 0.5 * truck_m, OWN_LANE_M + left_m);
+    truck.vehicle.dimensions.length_m = truck_m;
+    let d_m = OWN_LANE_M + left_m - towards_ego_m.copysign(left_m);
+    let mut behind = scene_vehicle(2, VehicleClass::Motorcycle, front_m - truck_m - gap_m - 1.1, d_m);
+    let mut seen = [0; 2];
+    for index in 0..285 {
+        for vehicle in [&mut truck, &mut behind] {
+            vehicle.state.speed_mps = EGO_MPS + 2.0;
+        }
+        let others = [truck, behind];
+        let scene = Scene {
+            time: CONTROL_STEP * index,
+            road: &road,
+            environment: &Environment::CLEAR_DAY,
+            ego,
+            others: &others,
+        };
+        let tracks = perception.step(&scene).unwrap();
+        let mut confirmed =
+            tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative);
+        let x_m = behind.state.s_m - ego.state.s_m;
+        seen[0] += usize::from(confirmed.any(|track| (track.state[0] - x_m).abs() <= 2.0));
+        seen[1] += 1;
+        for vehicle in [&mut ego, &mut truck, &mut behind] {
+            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
+        }
+    }
+    seen
+}
+
+#[test]
+fn a_motorcycle_behind_a_truck_is_no_part_of_the_truck() {
+    // It rides on the side of the lane from which the ego sees it past the truck.
+    for (gap_m, towards_ego_m) in [(5.0, 0.7), (5.0, 1.2), (8.0, 0.5), (8.0, 0.9)] {
+        for left_m in [3.75, -3.75] {
+            let [tracked, steps] = behind_a_truck(gap_m, left_m, towards_ego_m);
+            assert!(3 * tracked >= 2 * steps, "{gap_m} {left_m} {towards_ego_m}: {tracked} of {steps}");
+        }
     }
 }

@@ -50,12 +50,14 @@ const SPAN_SD_M: f64 = 0.5;
 /// Standard deviation of the speed beyond which a track is lost whose front is unknown (m/s;
 /// assumption).
 const LOST_SPEED_SD_MPS: f64 = 3.0;
-/// Greatest width of a box around the wheels on one side of a truck (m; assumption). A classifier
-/// may take them for a motorcycle.
-const WIDEST_WHEEL_M: f64 = 1.0;
-/// Greatest height of such a box (m; assumption): the frame above the wheels and half of a
-/// footprint, less than a rider.
-const HIGHEST_WHEEL_M: f64 = 1.4;
+/// Greatest width of a box around the wheels on one side of a truck (m; assumption): twin tyres are
+/// 0.6 m wide. A classifier may take them for a motorcycle.
+const WIDEST_WHEEL_M: f64 = 0.62;
+/// Greatest height of a box around wheels and frame (m; assumption): less than a rider.
+const HIGHEST_WHEEL_M: f64 = 1.2;
+/// Greatest width of a motorcycle and its rider (m; assumption). Wider boxes that are no faces are
+/// the tail of a truck.
+const WIDEST_MOTORCYCLE_M: f64 = 1.0;
 /// Greatest distance between two axles of a truck, between which nothing else may be seen (m;
 /// assumption).
 const WHEELS_APART_M: f64 = 8.0;
@@ -185,9 +187,7 @@ impl TrackState {
         let [seen_rear_m, seen_front_m] =
             seen.along_m.map(|s_m| s_m - measurement.along.time_offset_s * along.speed_mps);
         let [right_m, left_m] = seen.across_m.map(|d_m| d_m - across.position_m);
-        let is_low = seen.top_m <= HIGHEST_WHEEL_M && left_m - right_m <= WIDEST_WHEEL_M;
-        let may_be_wheel = is_low && self.ends.has_front && self.is_truck();
-        let rear_m = if seen.is_face && !may_be_wheel { rear_m } else { rear_m - self.beyond_m() };
+        let rear_m = if self.may_be_tail(seen) { rear_m - self.beyond_m() } else { rear_m };
         // If the front is out of view, the vehicle may be a truck whose frame was seen first.
         let half_width_m = self.half_width_m();
         let wider_m = if self.ends.has_front { half_width_m } else { half_width_m + MAX_WIDER_M };
@@ -195,6 +195,18 @@ impl TrackState {
         let [to_right_m, to_left_m] =
             if across.position_m > ego.d_m { [nearer_m, wider_m] } else { [wider_m, nearer_m] };
         seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
+    }
+
+    /// Returns whether something seen behind the vehicle's assumed rear end may belong to it: not a
+    /// face, unless wheels may have been taken for a face, and nothing as wide and high as a rider.
+    fn may_be_tail(&self, seen: &Span) -> bool {
+        let width_m = seen.across_m[1] - seen.across_m[0];
+        let is_narrow = width_m <= WIDEST_MOTORCYCLE_M;
+        let may_be_rider = is_narrow && width_m > WIDEST_WHEEL_M && seen.top_m > HIGHEST_WHEEL_M;
+        match (seen.is_face, self.ends.has_front) {
+            (false, has_front) => !(has_front && may_be_rider),
+            (true, has_front) => has_front && is_narrow && !may_be_rider && self.is_truck(),
+        }
     }
 
     /// Returns the positions along the road between which parts of the vehicle lie (m). A front
