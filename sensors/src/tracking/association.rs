@@ -93,6 +93,7 @@ mod tests {
             spacing_m: [f64::INFINITY; 2],
             wheels: WheelFronts::NONE,
             top_m: 1.5,
+            points: 40,
         };
         Measurement { along: axis(s_m), across: axis(d_m), is_part: false, knows_middle: true, seen }
     }

@@ -85,6 +85,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
             spacing_m: detection.seen.spacing_m,
             wheels: detection.seen.wheels.shifted(s_m),
             top_m: detection.top_m,
+            points: detection.points,
         },
     }
 }

@@ -79,6 +79,8 @@ pub(crate) struct Span {
     pub(crate) wheels: WheelFronts,
     /// Height of the highest point (m).
     pub(crate) top_m: f64,
+    /// Number of points.
+    pub(crate) points: usize,
 }
 
 impl Measurement {

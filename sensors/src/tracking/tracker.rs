@@ -51,13 +51,21 @@ const SPAN_SD_M: f64 = 0.5;
 /// assumption).
 const LOST_SPEED_SD_MPS: f64 = 3.0;
 /// Greatest width of a box around the wheels on one side of a truck (m; assumption): twin tyres are
-/// 0.6 m wide. A classifier may take them for a motorcycle.
+/// 0.6 m wide.
 const WIDEST_WHEEL_M: f64 = 0.62;
 /// Greatest height of a box around wheels and frame (m; assumption): less than a rider.
 const HIGHEST_WHEEL_M: f64 = 1.2;
+/// Greatest distance of the outer edge of wheels from the truck's side (m; assumption).
+const WHEEL_AT_SIDE_M: f64 = 0.12;
+/// Greatest distance behind the ego up to which a narrow and high box at a truck's side may be its
+/// wheels (m; assumption). Farther away, the columns are so far apart that a rider looks as narrow.
+const FARTHEST_WHEEL_M: f64 = 50.0;
 /// Greatest width of a motorcycle and its rider (m; assumption). Wider boxes that are no faces are
 /// the tail of a truck.
 const WIDEST_MOTORCYCLE_M: f64 = 1.0;
+/// Least number of points of a rider whose other edge is hidden (assumption): fewer give no track
+/// that lasts.
+const RIDER_POINTS: usize = 12;
 /// Greatest distance between two axles of a truck, between which nothing else may be seen (m;
 /// assumption).
 const WHEELS_APART_M: f64 = 8.0;
@@ -187,7 +195,7 @@ impl TrackState {
         let [seen_rear_m, seen_front_m] =
             seen.along_m.map(|s_m| s_m - measurement.along.time_offset_s * along.speed_mps);
         let [right_m, left_m] = seen.across_m.map(|d_m| d_m - across.position_m);
-        let rear_m = if self.may_be_tail(seen) { rear_m - self.beyond_m() } else { rear_m };
+        let rear_m = if self.may_be_tail(seen, [right_m, left_m], ego) { rear_m - self.beyond_m() } else { rear_m };
         // If the front is out of view, the vehicle may be a truck whose frame was seen first.
         let half_width_m = self.half_width_m();
         let wider_m = if self.ends.has_front { half_width_m } else { half_width_m + MAX_WIDER_M };
@@ -197,16 +205,22 @@ impl TrackState {
         seen_rear_m <= front_m && seen_front_m >= rear_m && right_m <= to_left_m && left_m >= -to_right_m
     }
 
-    /// Returns whether something seen behind the vehicle's assumed rear end may belong to it: not a
-    /// face, unless wheels may have been taken for a face, and nothing as wide and high as a rider.
-    fn may_be_tail(&self, seen: &Span) -> bool {
-        let width_m = seen.across_m[1] - seen.across_m[0];
+    /// Returns whether something seen behind the vehicle's assumed rear end, between these distances
+    /// to the left of the vehicle's middle (m), may belong to the vehicle.
+    fn may_be_tail(&self, seen: &Span, [right_m, left_m]: [f64; 2], ego: &EgoRear) -> bool {
+        let width_m = left_m - right_m;
         let is_narrow = width_m <= WIDEST_MOTORCYCLE_M;
-        let may_be_rider = is_narrow && width_m > WIDEST_WHEEL_M && seen.top_m > HIGHEST_WHEEL_M;
-        match (seen.is_face, self.ends.has_front) {
-            (false, has_front) => !(has_front && may_be_rider),
-            (true, has_front) => has_front && is_narrow && !may_be_rider && self.is_truck(),
+        if seen.is_face {
+            // A classifier may take wheels, and the piece of the load above them, for a motorcycle.
+            let is_low = is_narrow && seen.top_m <= HIGHEST_WHEEL_M;
+            let inside_m = 0.5 * self.size_m().1 - left_m.max(-right_m);
+            let is_near = ego.s_m - seen.along_m[1] <= FARTHEST_WHEEL_M;
+            let is_wheel = width_m <= WIDEST_WHEEL_M && inside_m.abs() <= WHEEL_AT_SIDE_M && is_near;
+            return self.ends.has_front && self.is_truck() && (is_low || is_wheel);
         }
+        let may_be_rider =
+            is_narrow && width_m > WIDEST_WHEEL_M && seen.top_m > HIGHEST_WHEEL_M && seen.points >= RIDER_POINTS;
+        !(self.ends.has_front && may_be_rider)
     }
 
     /// Returns the positions along the road between which parts of the vehicle lie (m). A front

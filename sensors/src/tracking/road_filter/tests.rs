@@ -27,6 +27,7 @@ fn seen(step: u32, d_m: f64, is_part: bool) -> Measurement {
             spacing_m: [f64::INFINITY; 2],
             wheels: WheelFronts::NONE,
             top_m: 1.5,
+            points: 40,
         },
     }
 }
