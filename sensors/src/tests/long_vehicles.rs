@@ -7,8 +7,8 @@
 use std::collections::BTreeSet;
 
 use closecall_traffic::{
-    ActorId, BodyShape, CONTROL_STEP, Check, Dimensions, Environment, Parameters, Road, Source, TrackId, TrackStatus,
-    VehicleClass,
+    ActorId, BodyShape, CONTROL_STEP, Check, Dimensions, Environment, Parameters, Road, Source, Track, TrackId,
+    TrackStatus, VehicleClass,
 };
 
 use super::tracking::PERIOD_S;
@@ -54,14 +54,42 @@ struct Observed {
     in_other_lane: usize,
 }
 
-/// Lets the vehicle pass, with the random numbers of this sample.
-fn pass(passing: &Passing, sample: u64) -> Observed {
+/// Returns the ego at the start, and the position of its rear end (m).
+fn ego_at_start() -> (SceneVehicle, f64) {
+    let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), EGO_MPS);
+    (ego, ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m)
+}
+
+/// Drives the ego and the others at constant speeds, with the random numbers of this seed and
+/// sample. Calls `see` in each step with its number, the confirmed rear tracks, the ego and the
+/// others.
+fn drive<const N: usize>(
+    [seed, sample]: [u64; 2],
+    mut others: [SceneVehicle; N],
+    steps: usize,
+    mut see: impl FnMut(usize, &[Track], &SceneVehicle, &[SceneVehicle; N]),
+) {
     let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
-    let key = NoiseKey { seed: 9, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() };
+    let key = NoiseKey { seed, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() };
     let mut perception = sensors.build(&key).unwrap();
     let road = Road::straight(3);
-    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), EGO_MPS);
-    let rear_s_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m;
+    let (mut ego, _) = ego_at_start();
+    for (step, index) in (0..steps).zip(0..) {
+        let environment = &Environment::CLEAR_DAY;
+        let scene = Scene { time: CONTROL_STEP * index, road: &road, environment, ego, others: &others };
+        let tracks = perception.step(&scene).unwrap().iter();
+        let is_confirmed = |track: &&Track| track.source == Source::Rear && track.status != TrackStatus::Tentative;
+        let confirmed: Vec<Track> = tracks.filter(is_confirmed).cloned().collect();
+        see(step, &confirmed, &ego, &others);
+        for vehicle in others.iter_mut().chain([&mut ego]) {
+            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
+        }
+    }
+}
+
+/// Lets the vehicle pass, with the random numbers of this sample.
+fn pass(passing: &Passing, sample: u64) -> Observed {
+    let (_, rear_s_m) = ego_at_start();
     let s_m = rear_s_m + passing.front_m - 0.5 * passing.length_m;
     let mut truck = scene_vehicle(1, VehicleClass::Truck, s_m, OWN_LANE_M + passing.left_m);
     truck.vehicle.dimensions = Dimensions { length_m: passing.length_m, ..passing.shape.usual_dimensions() };
@@ -71,21 +99,7 @@ fn pass(passing: &Passing, sample: u64) -> Observed {
     let mut confirmed_at: Vec<(TrackId, usize)> = Vec::new();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds")]
     let steps = (passing.seconds / PERIOD_S) as usize;
-    for (step, index) in (0..steps).zip(0..) {
-        let others = [truck];
-        let scene = Scene {
-            time: CONTROL_STEP * index,
-            road: &road,
-            environment: &Environment::CLEAR_DAY,
-            ego,
-            others: &others,
-        };
-        let tracks = perception.step(&scene).unwrap();
-        let is_confirmed = |track: &&_| {
-            let track: &closecall_traffic::Track = track;
-            track.source == Source::Rear && track.status != TrackStatus::Tentative
-        };
-        let confirmed: Vec<_> = tracks.iter().filter(is_confirmed).collect();
+    drive([9, sample], [truck], steps, |step, confirmed, _, [truck]| {
         observed.steps += 1;
         observed.several += usize::from(confirmed.len() > 1);
         observed.confirmed_steps += usize::from(!confirmed.is_empty());
@@ -102,10 +116,7 @@ fn pass(passing: &Passing, sample: u64) -> Observed {
                 observed.in_other_lane += usize::from(!(track.lane[lane] >= 0.5));
             }
         }
-        for vehicle in [&mut ego, &mut truck] {
-            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
-        }
-    }
+    });
     observed
 }
 
@@ -187,42 +198,22 @@ fn trucks_of_other_lengths_speeds_and_offsets_are_one_track_too() {
 /// ego and a truck beside the ego, `aside_m` to its left. Either the follower has no confirmed track
 /// of its own or several, or a confirmed track is where neither vehicle is.
 fn beside_a_truck(follower: VehicleClass, aside_m: f64, offset_m: f64, sample: u64) -> [usize; 2] {
-    let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
-    let actors = [].into();
-    let mut perception =
-        sensors.build(&NoiseKey { seed: 11, sample, ego: ActorId::new("ego").unwrap(), actors }).unwrap();
-    let road = Road::straight(3);
     let own_m = OWN_LANE_M;
-    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, own_m), EGO_MPS);
-    let rear_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m;
+    let (_, rear_m) = ego_at_start();
     let mut truck = scene_vehicle(1, VehicleClass::Truck, rear_m + 3.0 - 9.0, own_m + aside_m);
     truck.vehicle.dimensions.length_m = 18.0;
     let mut behind = scene_vehicle(2, follower, rear_m - 10.0, own_m + offset_m);
+    for vehicle in [&mut truck, &mut behind] {
+        vehicle.state.speed_mps = EGO_MPS;
+    }
     let mut wrong = [0; 2];
-    for index in 0..75 {
-        for vehicle in [&mut truck, &mut behind] {
-            vehicle.state.speed_mps = EGO_MPS;
-        }
-        let others = [truck, behind];
-        let scene = Scene {
-            time: CONTROL_STEP * index,
-            road: &road,
-            environment: &Environment::CLEAR_DAY,
-            ego,
-            others: &others,
-        };
-        let tracks = perception.step(&scene).unwrap();
-        let confirmed =
-            tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative);
-        if index >= 50 {
-            let y_m: Vec<f64> = confirmed.map(|track| track.state[1]).collect();
+    drive([11, sample], [truck, behind], 75, |step, confirmed, _, _| {
+        if step >= 50 {
+            let y_m: Vec<f64> = confirmed.iter().map(|track| track.state[1]).collect();
             wrong[0] += y_m.iter().filter(|y_m| (*y_m - offset_m).abs() <= 0.3).count().abs_diff(1);
             wrong[1] += y_m.iter().filter(|y_m| (*y_m - offset_m).abs() > 0.3 && (*y_m - aside_m).abs() > 0.3).count();
         }
-        for vehicle in [&mut ego, &mut truck, &mut behind] {
-            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
-        }
-    }
+    });
     wrong
 }
 
@@ -259,53 +250,34 @@ struct Following {
 fn behind_a_truck(following: &Following) -> (f64, usize) {
     const TRUCK_M: f64 = 14.0;
     let Following { shape, gap_m, towards_ego_m, left_m, from_m, faster_mps } = *following;
-    let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
-    let actors = [].into();
-    let mut perception =
-        sensors.build(&NoiseKey { seed: 11, sample: 3, ego: ActorId::new("ego").unwrap(), actors }).unwrap();
-    let road = Road::straight(3);
-    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), EGO_MPS);
-    let front_m = ego.state.s_m - 0.5 * ego.vehicle.dimensions.length_m - from_m;
+    let (_, rear_m) = ego_at_start();
+    let front_m = rear_m - from_m;
     let mut truck = scene_vehicle(1, VehicleClass::Truck, front_m - 0.5 * TRUCK_M, OWN_LANE_M + left_m);
     truck.vehicle.dimensions.length_m = TRUCK_M;
     let d_m = truck.state.d_m - towards_ego_m.copysign(left_m);
     let mut behind = scene_vehicle(2, VehicleClass::Motorcycle, front_m - TRUCK_M - gap_m - 1.1, d_m);
     behind.vehicle.appearance.body_shape = shape;
     behind.vehicle.dimensions.height_m = shape.usual_dimensions().height_m;
-    let (mut tracked, mut more) = (0.0, 0);
-    #[expect(clippy::cast_possible_truncation, reason = "a few seconds")]
-    let steps = ((from_m - 7.0) / faster_mps / PERIOD_S) as i64;
-    for index in 0..steps {
-        for vehicle in [&mut truck, &mut behind] {
-            vehicle.state.speed_mps = EGO_MPS + faster_mps;
-        }
-        let others = [truck, behind];
-        let scene = Scene {
-            time: CONTROL_STEP * index,
-            road: &road,
-            environment: &Environment::CLEAR_DAY,
-            ego,
-            others: &others,
-        };
-        let tracks = perception.step(&scene).unwrap();
+    for vehicle in [&mut truck, &mut behind] {
+        vehicle.state.speed_mps = EGO_MPS + faster_mps;
+    }
+    let (mut tracked, mut more) = (0, 0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds")]
+    let steps = ((from_m - 7.0) / faster_mps / PERIOD_S) as usize;
+    drive([11, 3], [truck, behind], steps, |_, confirmed, ego, [truck, behind]| {
         // Confirmed tracks within these distances of a vehicle.
         let count = |vehicle: &SceneVehicle, along_m: f64, across_m: f64| {
             let [x_m, y_m] = [vehicle.state.s_m - ego.state.s_m, vehicle.state.d_m - ego.state.d_m];
-            let is_there = |track: &&closecall_traffic::Track| {
-                let is_rear = track.source == Source::Rear && track.status != TrackStatus::Tentative;
-                is_rear && (track.state[0] - x_m).abs() <= along_m && (track.state[1] - y_m).abs() <= across_m
-            };
-            tracks.iter().filter(is_there).count()
+            let is_there =
+                |track: &&Track| (track.state[0] - x_m).abs() <= along_m && (track.state[1] - y_m).abs() <= across_m;
+            confirmed.iter().filter(is_there).count()
         };
-        let of_motorcycle = count(&behind, 2.0, 1.3);
-        tracked += f64::from(u8::from(of_motorcycle > 0));
-        more += count(&ego, f64::INFINITY, f64::INFINITY) - of_motorcycle.min(1) - count(&truck, 8.0, 1.9).min(1);
-        for vehicle in [&mut ego, &mut truck, &mut behind] {
-            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
-        }
-    }
+        let of_motorcycle = count(behind, 2.0, 1.3).min(1);
+        tracked += of_motorcycle;
+        more += confirmed.len() - of_motorcycle - count(truck, 8.0, 1.9).min(1);
+    });
     #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
-    let share = tracked / steps as f64;
+    let share = tracked as f64 / steps as f64;
     (share, more)
 }
 
