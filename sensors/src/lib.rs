@@ -59,7 +59,8 @@ pub use ground_truth::GroundTruth;
 pub use lidar_chain::MAX_ADDITIONAL_LIDARS;
 pub use object::{
     ByClass, Chain, ErrorGrid, ErrorGrids, FitError, FittedErrors, NamedGrid, NoiseKey, ObjectPerception,
-    ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit, ShapeRatios, Validation, ValidationFigures,
+    ObjectSensorConfig, ObjectSensorModel, Origin, PitchedShapes, RangeGrid, RearFit, ShapeRatios, Validation,
+    ValidationFigures,
 };
 pub use perception::{FieldOfView, Health, MountedLidar, Perception, RearImage, SensorAlarms, SensorHealth, UsedBox};
 pub use radar::{MountedRadars, RadarReturn, RadarSource, RearRadar, RearRadarConfig};

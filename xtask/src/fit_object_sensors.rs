@@ -4,6 +4,7 @@
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors -n 2 -o own.toml
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --errors       # the errors alone, with the ranges as built
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --ranges       # the ranges alone, with the errors as built
+//!     cargo run --release -p closecall-xtask -- fit-object-sensors --pitched      # the ranges under pitches of the ego alone
 //!     cargo run --release -p closecall-xtask -- fit-object-sensors --validate --seed 1
 //!
 //! A fit takes some minutes. The next build puts the figures into the sensor. With `--validate`,
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 use closecall::scenarios::source;
 use closecall::traffic::atomic::write_file;
 use closecall_sensors::{Chain, RearFit};
-use closecall_studies::perception::fit::{FitPlan, at_bounds, fit, fit_errors, fit_ranges};
+use closecall_studies::perception::fit::{FitPlan, at_bounds, fit, fit_errors, fit_pitched, fit_ranges};
 use closecall_studies::perception::validation::{Measured, differences, measure, table};
 
 /// First line of the file.
@@ -47,6 +48,9 @@ pub(crate) struct Args {
     /// Fit the ranges alone; the errors, losses and scores stay as they are
     #[arg(long, conflicts_with_all = ["validate", "errors"])]
     ranges: bool,
+    /// Fit the ranges under pitches of the ego alone; all else stays as it is
+    #[arg(long, conflicts_with_all = ["validate", "errors", "ranges"])]
+    pitched: bool,
     /// Measure the sensor as built beside the full chain, in place of a fit
     #[arg(long)]
     validate: bool,
@@ -65,6 +69,7 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn std::error::Error>> {
                 Args { validate: true, .. } => "--validate ",
                 Args { errors: true, .. } => "--errors ",
                 Args { ranges: true, .. } => "--ranges ",
+                Args { pitched: true, .. } => "--pitched ",
                 _ => "",
             },
             args.approaches,
@@ -80,6 +85,7 @@ pub(crate) fn main(args: Args) -> Result<(), Box<dyn std::error::Error>> {
         Args { validate: true, .. } => validated(&plan, fitted)?,
         Args { errors: true, .. } => fit_errors(&plan, &fitted)?,
         Args { ranges: true, .. } => fit_ranges(&plan, &fitted)?,
+        Args { pitched: true, .. } => fit_pitched(&plan, &fitted)?,
         _ => fit(&plan)?,
     };
     at_bounds(&model).iter().for_each(|warning| println!("warning: {warning}"));

@@ -19,7 +19,8 @@
 //!
 //! The LiDAR sees only lamps and plate of a distant dark vehicle. Whether enough of its beams return
 //! enough light depends on where they hit, and so on the distance. The full chain has a track at some
-//! distances, loses it, and has it again.
+//! distances, loses it, and has it again. It depends on the pitch of the ego, too: 0.008° move the
+//! beams by 0.01 m at 100 m, and the range of a dark car by 5 m ([`PitchedShapes`]).
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -60,6 +61,11 @@ pub struct RearFit {
     pub range: Vec<RangeGrid>,
     /// Ranges of body shapes, as ratios to the ranges of their class.
     pub shapes: ShapeRatios,
+    /// The ranges of body shapes under pitches of the ego, in rising order. If there are some, they
+    /// hold in place of `shapes` and `range_spread`. Between them, ranges are interpolated linearly;
+    /// beyond them, the outermost ranges hold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pitched: Vec<PitchedShapes>,
     /// Errors and losses of the measurements.
     pub errors: ErrorGrids,
     /// Comparison of the sensor's tracks with the tracks of the full chain, if it was measured. No
@@ -135,6 +141,28 @@ pub struct ShapeRatios {
     pub intermittent_share: BTreeMap<String, Vec<Vec<f64>>>,
 }
 
+/// The ranges of body shapes under one pitch of the ego, as ratios to the ranges of the first shape
+/// of their class without pitch.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct PitchedShapes {
+    /// The pitch, positive nose down (rad).
+    pub pitch_rad: f64,
+    /// Reflectivities of the paint of the grid (-), in rising order.
+    pub paints: Vec<f64>,
+    /// Extinctions of the grid (1/m), in rising order.
+    pub extinctions_per_m: Vec<f64>,
+    /// For each shape and paint, the ratio of the ranges in each extinction (-); 1 if a shape is
+    /// absent.
+    pub range: BTreeMap<String, Vec<Vec<f64>>>,
+    /// For each shape and paint, the ratio of the distances from which on a vehicle is classified
+    /// as one (-); 1 if a shape is absent.
+    pub class_range: BTreeMap<String, Vec<Vec<f64>>>,
+    /// For each shape and paint, the standard deviation of the logarithm of the range over places in
+    /// the lane and noise of the sensors (-); 0 if a shape is absent.
+    pub spread: BTreeMap<String, Vec<Vec<f64>>>,
+}
+
 /// The distances at which one vehicle is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TargetRanges {
@@ -167,6 +195,45 @@ impl TargetRanges {
             class_range_m: factor * self.class_range_m,
             intermittent_m: factor * self.intermittent_m,
             ..self
+        }
+    }
+
+    /// Returns the distances at this share of the way from these to others (-).
+    fn on_the_way_to(self, to: &Self, share: f64) -> Self {
+        let between = |from: f64, to: f64| if share == 0.0 { from } else { from + share * (to - from) };
+        Self {
+            range_m: between(self.range_m, to.range_m),
+            class_range_m: between(self.class_range_m, to.class_range_m),
+            intermittent_m: between(self.intermittent_m, to.intermittent_m),
+            intermittent_share: between(self.intermittent_share, to.intermittent_share),
+        }
+    }
+}
+
+/// The distances at which one vehicle is seen, over the pitch of the ego (rad), in rising order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PitchedRanges(Vec<(f64, TargetRanges)>);
+
+impl PitchedRanges {
+    /// Returns distances that do not depend on the pitch.
+    pub(super) fn constant(ranges: TargetRanges) -> Self {
+        Self(vec![(0.0, ranges)])
+    }
+
+    /// Returns the distances after a change of each.
+    pub(super) fn map(self, change: impl Fn(TargetRanges) -> TargetRanges) -> Self {
+        Self(self.0.into_iter().map(|(pitch_rad, ranges)| (pitch_rad, change(ranges))).collect())
+    }
+
+    /// Returns the distances under a pitch (rad); none are known before the first.
+    pub(super) fn at(&self, pitch_rad: f64) -> TargetRanges {
+        let next = self.0.partition_point(|(knot_rad, _)| *knot_rad <= pitch_rad);
+        match (self.0.get(next.saturating_sub(1)), self.0.get(next)) {
+            (Some((from_rad, from)), Some((to_rad, to))) if next > 0 => {
+                from.on_the_way_to(to, (pitch_rad - from_rad) / (to_rad - from_rad))
+            }
+            (Some((_, outermost)), _) => *outermost,
+            (None, _) => TargetRanges::UNKNOWN,
         }
     }
 }
@@ -215,19 +282,15 @@ impl RearFit {
             check_grid(&format!("range[{index}].range-m"), &grid.range_m, knots, [1.0, 500.0])?;
             check_grid(&format!("range[{index}].class-range-m"), &grid.class_range_m, knots, [1.0, 500.0])?;
         }
-        let ShapeRatios { paints, extinctions_per_m, range, class_range, intermittent, intermittent_share } =
-            &self.shapes;
-        let knots = [&**paints, &**extinctions_per_m];
-        check_knots("shapes.", knots)?;
-        for (name, ratios, bounds) in [
-            ("range", range, [0.05, 20.0]),
-            ("class-range", class_range, [0.05, 20.0]),
-            ("intermittent", intermittent, [1.0, 50.0]),
-            ("intermittent-share", intermittent_share, [0.0, 1.0]),
-        ] {
-            for (shape, ratios) in ratios {
-                check_grid(&format!("shapes.{name}.{shape}"), ratios, knots, bounds)?;
+        self.shapes.check("shapes.")?;
+        for (index, pitched @ PitchedShapes { pitch_rad, .. }) in self.pitched.iter().enumerate() {
+            let key = format!("pitched[{index}].pitch-rad");
+            within(&key, *pitch_rad, [-0.1, 0.1])?;
+            let is_rising = index == 0 || self.pitched[index - 1].pitch_rad < *pitch_rad;
+            if !is_rising {
+                return Err(format!("`{key}` is {pitch_rad}, but a number above the one before is needed"));
             }
+            pitched.check(&format!("pitched[{index}]."))?;
         }
         self.errors.check()?;
         self.validation.as_ref().map_or(Ok(()), Validation::check)
@@ -258,13 +321,33 @@ impl RearFit {
         self.ranges(class, appearance, environment).range_m
     }
 
-    /// Returns the distances at which a vehicle is seen.
-    pub(super) fn ranges(
+    /// Returns the distances at which a vehicle is seen, over the pitch of the ego. They are
+    /// multiplied by `factor` (-), and deviate by `deviation` standard deviations.
+    pub(super) fn pitched_ranges(
         &self,
         class: VehicleClass,
         appearance: &Appearance,
         environment: &Environment,
-    ) -> TargetRanges {
+        [factor, deviation]: [f64; 2],
+    ) -> PitchedRanges {
+        let scaled = |ranges: TargetRanges, spread: f64| ranges.scaled(factor * maths::exp(spread * deviation));
+        if self.pitched.is_empty() {
+            return PitchedRanges::constant(scaled(self.ranges(class, appearance, environment), self.range_spread));
+        }
+        let at = [appearance.paint_reflectivity, extinction_per_m(environment)];
+        let [range_m, class_range_m] = self.grid_m(class, appearance.plate, at);
+        let ranges = |pitched: &PitchedShapes| {
+            let [range, class_range, spread] = pitched.at(appearance.body_shape.name(), at);
+            let (range_m, class_range_m) = (range_m * range, class_range_m * class_range);
+            let is_known_at_once = class_range_m >= KNOWN_AT_ONCE_SHARE * range_m;
+            let class_range_m = if is_known_at_once { class_range_m.max(range_m) } else { class_range_m };
+            scaled(TargetRanges::without_interruption(range_m, class_range_m), spread)
+        };
+        PitchedRanges(self.pitched.iter().map(|pitched| (pitched.pitch_rad, ranges(pitched))).collect())
+    }
+
+    /// Returns the distances at which a vehicle is seen.
+    fn ranges(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> TargetRanges {
         let at = [appearance.paint_reflectivity, extinction_per_m(environment)];
         let [range_m, class_range_m] = self.grid_m(class, appearance.plate, at);
         let ShapeRatios { paints, extinctions_per_m, range, class_range, intermittent, intermittent_share } =
@@ -293,6 +376,51 @@ impl RearFit {
         let Some(grid) = grid_with(plate).or_else(|| grid_with(Plate::Clean)) else { return [0.0; 2] };
         let knots = [&*self.paints, &*self.extinctions_per_m];
         [interpolated(knots, &grid.range_m, at), interpolated(knots, &grid.class_range_m, at)]
+    }
+}
+
+impl ShapeRatios {
+    /// Checks the ratios, whose keys begin with `prefix`.
+    fn check(&self, prefix: &str) -> Result<(), String> {
+        let Self { paints, extinctions_per_m, range, class_range, intermittent, intermittent_share } = self;
+        let knots = [&**paints, &**extinctions_per_m];
+        check_knots(prefix, knots)?;
+        for (name, ratios, bounds) in [
+            ("range", range, [0.05, 20.0]),
+            ("class-range", class_range, [0.05, 20.0]),
+            ("intermittent", intermittent, [1.0, 50.0]),
+            ("intermittent-share", intermittent_share, [0.0, 1.0]),
+        ] {
+            for (shape, ratios) in ratios {
+                check_grid(&format!("{prefix}{name}.{shape}"), ratios, knots, bounds)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl PitchedShapes {
+    /// Checks the ratios, whose keys begin with `prefix`.
+    fn check(&self, prefix: &str) -> Result<(), String> {
+        let Self { pitch_rad: _, paints, extinctions_per_m, range, class_range, spread } = self;
+        let knots = [&**paints, &**extinctions_per_m];
+        check_knots(prefix, knots)?;
+        for (name, values, bounds) in
+            [("range", range, [0.05, 20.0]), ("class-range", class_range, [0.05, 20.0]), ("spread", spread, [0.0, 1.0])]
+        {
+            for (shape, values) in values {
+                check_grid(&format!("{prefix}{name}.{shape}"), values, knots, bounds)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the ratios of range and class range, and the spread, of a shape with this paint (-)
+    /// in air of this extinction (1/m).
+    fn at(&self, shape: &str, at: [f64; 2]) -> [f64; 3] {
+        let knots = [&*self.paints, &*self.extinctions_per_m];
+        [(&self.range, 1.0), (&self.class_range, 1.0), (&self.spread, 0.0)]
+            .map(|(grids, absent)| grids.get(shape).map_or(absent, |grid| interpolated(knots, grid, at)))
     }
 }
 
@@ -390,6 +518,46 @@ mod tests {
         assert_eq!(model.with_fit(Box::leak(Box::new(other))).range_m, 50.0);
     }
 
+    /// Returns shapes under these pitches (rad), under which saloons have these ratios of the ranges
+    /// (-).
+    fn pitched(pitches: &[(f64, f64)]) -> Vec<PitchedShapes> {
+        let with_ratio = |(pitch_rad, ratio): &(f64, f64)| {
+            let grid = |value| BTreeMap::from([("saloon".to_owned(), vec![vec![value; 2]; 2])]);
+            PitchedShapes {
+                pitch_rad: *pitch_rad,
+                paints: vec![0.1, 0.5],
+                extinctions_per_m: vec![0.0, 0.1],
+                range: grid(*ratio),
+                class_range: BTreeMap::new(),
+                spread: grid(0.1),
+            }
+        };
+        pitches.iter().map(with_ratio).collect()
+    }
+
+    #[test]
+    fn ranges_follow_the_pitch_of_the_ego() {
+        let mut fit = RearFit::shipped().unwrap().clone();
+        let saloon = Vehicle::typical(VehicleClass::Car);
+        let range_m = |fit: &RearFit, pitch_rad, deviation| {
+            let environment = Environment::CLEAR_DAY;
+            let pitched = fit.pitched_ranges(saloon.class, &saloon.appearance, &environment, [2.0, deviation]);
+            0.5 * pitched.at(pitch_rad).range_m
+        };
+        fit.pitched.clear();
+        let level_m = range_m(&fit, 0.0, 0.0);
+        assert_eq!([-1.0, 1.0].map(|pitch_rad| range_m(&fit, pitch_rad, 0.0)), [level_m; 2]);
+        assert!((range_m(&fit, 0.0, 2.0) / level_m - maths::exp(2.0 * fit.range_spread)).abs() < 1e-9);
+        fit.pitched = pitched(&[(-1e-3, 0.8), (0.0, 1.0), (1e-3, 1.1), (2e-3, 1.5)]);
+        assert!((range_m(&fit, 1e-3, -2.0) / level_m - 1.1 * maths::exp(-0.2)).abs() < 1e-9);
+        for (pitch_rad, ratio) in
+            [(-1.0, 0.8), (-1e-3, 0.8), (-5e-4, 0.9), (0.0, 1.0), (5e-4, 1.05), (1.5e-3, 1.3), (2e-3, 1.5), (1.0, 1.5)]
+        {
+            let found = range_m(&fit, pitch_rad, 0.0) / level_m;
+            assert!((found - ratio).abs() < 1e-9, "{pitch_rad} rad: {found} instead of {ratio}");
+        }
+    }
+
     #[test]
     fn wrong_files_are_refused_with_key_and_range() {
         let fit = RearFit::shipped().unwrap();
@@ -421,6 +589,13 @@ mod tests {
                 "0 to 1",
             ),
             (refused(&|fit| fit.range.retain(|grid| grid.class != VehicleClass::Truck)), "range", "truck"),
+            (
+                refused(&|fit| fit.pitched = pitched(&[(1e-3, 1.0), (-1e-3, 1.0)])),
+                "pitched[1].pitch-rad",
+                "above the one before",
+            ),
+            (refused(&|fit| fit.pitched = pitched(&[(0.2, 1.0)])), "pitched[0].pitch-rad", "-0.1 to 0.1"),
+            (refused(&|fit| fit.pitched = pitched(&[(1e-3, 50.0)])), "pitched[0].range.saloon", "0.05 to 20"),
         ] {
             assert!(message.contains(key) && message.contains(range), "{message}");
         }

@@ -39,7 +39,7 @@ mod weather;
 
 pub use config::{ObjectSensorConfig, ObjectSensorModel};
 pub use errors::{ErrorGrid, ErrorGrids, FittedErrors, NamedGrid};
-pub use fit::{ByClass, FitError, Origin, RangeGrid, RearFit, ShapeRatios};
+pub use fit::{ByClass, FitError, Origin, PitchedShapes, RangeGrid, RearFit, ShapeRatios};
 pub use noise::NoiseKey;
 pub use perception::ObjectPerception;
 pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanInput};

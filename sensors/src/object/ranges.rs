@@ -1,10 +1,10 @@
 //! The range of an object-level sensor in the weather of the latest scan.
 
-use closecall_traffic::{Environment, Vehicle, VehicleClass, maths};
+use closecall_traffic::{Environment, Vehicle, VehicleClass};
 
 use super::config::ObjectSensorModel;
 use super::errors::TargetErrors;
-use super::fit::TargetRanges;
+use super::fit::{PitchedRanges, TargetRanges};
 use super::weather::range_in_weather_m;
 use crate::surroundings::OtherVehicle;
 
@@ -44,17 +44,18 @@ impl Ranges {
         true
     }
 
-    /// Returns the distances at which one vehicle is seen. `deviation` is the deviation of the
-    /// vehicle's ranges, in standard deviations.
-    pub(super) fn of(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> TargetRanges {
-        let ranges = match (model.fit, &self.weather) {
+    /// Returns the distances at which one vehicle is seen, over the pitch of the ego. `deviation` is
+    /// the deviation of the vehicle's ranges, in standard deviations.
+    pub(super) fn of(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> PitchedRanges {
+        let pitched = match (model.fit, &self.weather) {
             (Some(fit), Some(weather)) => {
-                let relative = model.range_m / fit.usual_m() * maths::exp(fit.range_spread * deviation);
-                fit.ranges(other.class, &other.appearance, weather).scaled(relative)
+                let relative = model.range_m / fit.usual_m();
+                fit.pitched_ranges(other.class, &other.appearance, weather, [relative, deviation])
             }
-            _ => TargetRanges::without_interruption(self.usual_m, f64::INFINITY),
+            _ => PitchedRanges::constant(TargetRanges::without_interruption(self.usual_m, f64::INFINITY)),
         };
-        TargetRanges { class_range_m: model.class_range_m.unwrap_or(ranges.class_range_m), ..ranges }
+        let class_range_m = |ranges: &TargetRanges| model.class_range_m.unwrap_or(ranges.class_range_m);
+        pitched.map(|ranges| TargetRanges { class_range_m: class_range_m(&ranges), ..ranges })
     }
 
     /// Returns the errors of one vehicle whose range is `range_m` (m).

@@ -15,7 +15,7 @@ use closecall_traffic::{CONTROL_STEP, ClassScores, Source, StandardNormal, Track
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::{FaultStreams, Faulty};
-use super::fit::TargetRanges;
+use super::fit::{PitchedRanges, TargetRanges};
 use super::noise::{MeasurementErrors, NoiseKey, Scan, TargetNoise};
 use super::ranges::Ranges;
 use super::target::{Filters, PIECES, Report, Target};
@@ -136,7 +136,7 @@ impl ObjectSensor {
         self.faulty.begin(input.scene.time, self.step, (self.direction, self.model.latency_steps));
         let [mut in_view, mut measured] = [0; 2];
         for (position, other) in input.others.iter().enumerate() {
-            let index = self.target_index(other, position);
+            let index = self.target_index(other, position, input.scene.ego.pitch_rad);
             let errors = self.errors(index, (position, other), input);
             let is_classified = self.visibility.is_within(self.targets[index].ranges.class_range_m, position);
             // Nobody expects a measurement of a vehicle beyond its range.
@@ -253,8 +253,8 @@ impl ObjectSensor {
     }
 
     /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It
-    /// is usually `position`, that in the list of other vehicles.
-    fn target_index(&mut self, other: &OtherVehicle, position: usize) -> usize {
+    /// is usually `position`, that in the list of other vehicles. The ego has this pitch (rad).
+    fn target_index(&mut self, other: &OtherVehicle, position: usize, pitch_rad: f64) -> usize {
         let actor = other.actor;
         let is_at = |target: &Target| target.actor == actor;
         let index = match self.targets.get(position).is_some_and(is_at) {
@@ -263,12 +263,14 @@ impl ObjectSensor {
         };
         if self.targets[index].ranges.range_m.is_nan() {
             let deviation = self.targets[index].range_deviation;
-            let ranges = self.ranges.of(&self.model, other, deviation);
-            let errors = self.ranges.errors(&self.model, other, ranges.range_m);
+            let pitched = self.ranges.of(&self.model, other, deviation);
+            let errors = self.ranges.errors(&self.model, other, pitched.at(0.0).range_m);
             let target = &mut self.targets[index];
             target.noise.draw_skipped(&target.errors);
-            (target.ranges, target.errors) = (ranges, errors);
+            (target.pitched, target.errors) = (pitched, errors);
         }
+        let target = &mut self.targets[index];
+        target.ranges = target.pitched.at(pitch_rad);
         index
     }
 
@@ -287,6 +289,7 @@ impl ObjectSensor {
         self.targets.push(Target {
             actor,
             range_deviation,
+            pitched: PitchedRanges::default(),
             ranges: TargetRanges::UNKNOWN,
             pieces,
             errors,

@@ -7,7 +7,7 @@ use closecall_traffic::{TrackId, TrackStatus};
 use super::config::MAX_LATENCY_STEPS;
 use super::errors::TargetErrors;
 use super::faulty::FaultStreams;
-use super::fit::TargetRanges;
+use super::fit::{PitchedRanges, TargetRanges};
 use super::noise::TargetNoise;
 
 /// Length of the pieces of road on which a vehicle beyond its range is seen or not (m): the usual
@@ -43,7 +43,9 @@ pub(super) struct Target {
     pub(super) actor: usize,
     /// Number of standard deviations by which the range of this vehicle deviates (-).
     pub(super) range_deviation: f64,
-    /// The distances in this weather at which the vehicle is seen.
+    /// The distances in this weather at which the vehicle is seen, over the pitch of the ego.
+    pub(super) pitched: PitchedRanges,
+    /// These distances under the pitch of the latest scan.
     pub(super) ranges: TargetRanges,
     /// A random number from 0 to 1 for each piece of the road behind, which tells whether the
     /// vehicle is seen there.

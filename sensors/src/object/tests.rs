@@ -1,6 +1,8 @@
 //! Tests of the properties that the controllers rely on: timely confirmation, a consistent
 //! covariance, and bitwise reproducibility.
 
+use std::collections::BTreeMap;
+
 use closecall_traffic::{
     ActorId, Alignment, AlignmentPoint, CONTROL_STEP, Environment, Parameters, Road, Source, Track, TrackStatus,
     VehicleClass,
@@ -248,6 +250,39 @@ fn beyond_its_range_a_vehicle_is_seen_at_a_share_of_the_distances() {
     assert_eq!(counts(0.0, 2), [1.0, 0.0, 0.0]);
     let [near, between, beyond] = counts(0.4, 40);
     assert!(near > 0.99 && (0.25..0.5).contains(&between) && beyond == 0.0, "{near} {between} {beyond}");
+}
+
+#[test]
+fn a_pitching_ego_sees_the_vehicle_at_another_distance() {
+    let mut fit = RearFit::shipped().unwrap().clone();
+    let ratios = |ratio: f64| BTreeMap::from([("saloon".to_owned(), vec![vec![ratio; 2]; 2])]);
+    let shapes = |(pitch_rad, ratio): (f64, f64)| PitchedShapes {
+        pitch_rad,
+        paints: vec![0.1, 0.5],
+        extinctions_per_m: vec![0.0, 0.1],
+        range: ratios(ratio),
+        class_range: ratios(ratio),
+        spread: BTreeMap::new(),
+    };
+    fit.pitched = [(0.0, 1.0), (1e-3, 0.6)].map(shapes).to_vec();
+    let fit = &*Box::leak(Box::new(fit));
+    let confirmed_m = |pitch_rad: f64| {
+        let (config, none) = (ObjectSensorConfig::default(), Parameters::default());
+        let rear = config.check_rear_object(&none).unwrap().with_fit(fit);
+        let models = [config.check_front_radar(&none).unwrap(), config.check_surround(&none).unwrap(), rear];
+        let (mut encounter, mut perception) = (Encounter::new(), ObjectPerception::new(models, &key(3)));
+        encounter.ego.pitch_rad = pitch_rad;
+        loop {
+            let tracks = perception.step(&encounter.scene()).unwrap();
+            if let Some(track) = confirmed_track(tracks, Source::Rear) {
+                break -track.x_m();
+            }
+            encounter.advance();
+        }
+    };
+    let [level_m, half_m, pitched_m] = [0.0, 5e-4, 1e-3].map(confirmed_m);
+    assert!((pitched_m / level_m - 0.6).abs() < 0.05, "{level_m} {pitched_m}");
+    assert!((half_m / level_m - 0.8).abs() < 0.05, "{level_m} {half_m}");
 }
 
 /// Returns the gaps behind the ego at which the rear vehicle, of a class and in fog of a

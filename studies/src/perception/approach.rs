@@ -25,6 +25,8 @@ const CLOSING_MPS: [f64; 2] = [2.8, 13.9];
 /// lane keeping of the rear vehicles in the library. A vehicle that is always in line with the
 /// sensor is struck at the same heights and edges in every approach.
 const LANE_KEEPING_M: f64 = 0.2;
+/// Distance beyond the visibility from which on an approach in fog is watched (m).
+const BEFORE_VISIBLE_M: f64 = 30.0;
 /// Gap of the car in between (m).
 const SCREEN_GAP_M: f64 = 25.0;
 /// Gap at which a vehicle appears for the time to confirm (m), and the longest time that is waited
@@ -123,6 +125,7 @@ impl Traffic {
             pitch_rad: 0.0,
         };
         let ego = vehicle(0, VehicleClass::Car, EGO_S_M, ego_d_m, EGO_MPS);
+        let ego = SceneVehicle { pitch_rad: case.ego_pitch_rad, ..ego };
         let behind = |actor, class, gap_m: f64, offset_m: f64, speed_mps| {
             let half_m = 0.5 * Vehicle::typical(class).dimensions.length_m;
             let s_m = EGO_S_M - 0.5 * ego.vehicle.dimensions.length_m - gap_m - half_m;
@@ -328,6 +331,13 @@ impl Watch {
     }
 }
 
+/// Returns the first gap of an approach (m). In fog, no vehicle is seen from farther than the
+/// visibility, and each step there costs twenty times as much as in clear air.
+fn first_gap_m(case: &Case) -> f64 {
+    let [far_m, _] = GAPS_M;
+    far_m.min(case.environment.visibility_m + BEFORE_VISIBLE_M)
+}
+
 /// Returns the gaps at which the vehicle has a track, in an approach with the noise of another one.
 ///
 /// # Errors
@@ -340,7 +350,7 @@ pub(crate) fn sightings(
     noise: Address,
 ) -> Result<Sightings, SensorError> {
     let mut watch = Watch::new();
-    let course = Course { case, sensors, road, at, noise, lane_keeping_m: LANE_KEEPING_M, from_m: GAPS_M[0] };
+    let course = Course { case, sensors, road, at, noise, lane_keeping_m: LANE_KEEPING_M, from_m: first_gap_m(case) };
     follow(&course, |gap_m, track, _| {
         let track = track.filter(|track| track.existence >= 0.5).map(|track| track.class.is_vehicle());
         watch.observe(gap_m, track);

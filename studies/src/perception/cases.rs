@@ -40,6 +40,8 @@ pub struct Case {
     pub shape: Option<BodyShape>,
     /// Its lateral offset from the ego, positive to the left (m).
     pub offset_m: f64,
+    /// The pitch of the ego, positive nose down (rad).
+    pub ego_pitch_rad: f64,
     /// Light and weather.
     pub environment: Environment,
     /// Whether another car drives 25 m behind the ego, in its lane.
@@ -69,6 +71,7 @@ impl Case {
             plate: Plate::Clean,
             shape: None,
             offset_m: 0.0,
+            ego_pitch_rad: 0.0,
             environment: *environment,
             is_screened: false,
             faults: None,

@@ -18,11 +18,17 @@
 //! time, because the full chain recognises a vehicle in fog at nearly the same distance at all
 //! closing speeds. The errors of the measurements are fitted until the tracks have the errors of
 //! the full chain.
+//!
+//! The pitch of the ego decides whether a layer of the LiDAR meets the lamps and the plate of a
+//! distant vehicle. Ranges under pitches are fitted in approaches of an ego that keeps its pitch.
+//! Their spread is over places in the lane, closing speeds and noise.
 
 use std::collections::BTreeMap;
 
 use closecall_scenarios::{Scenario, ScenarioFile, Setting};
-use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
+use closecall_sensors::{
+    ByClass, FittedErrors, Origin, PitchedShapes, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios,
+};
 use closecall_traffic::{BodyShape, Environment, Plate, Vehicle, VehicleClass, maths};
 use rayon::prelude::*;
 
@@ -45,6 +51,16 @@ const KOSCHMIEDER: f64 = 3.912;
 /// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid in fog.
 const SHAPE_PAINTS: [f64; 6] = PAINTS;
 const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
+/// Pitches of the ego under which body shapes are compared, positive nose down (rad). With the
+/// brake dive of the ego, they belong to −1 to 2 m/s². Around zero they lie close: the acceleration
+/// of an ego that follows a vehicle scatters by 0.05 m/s².
+const PITCHES_RAD: [f64; 16] = [
+    -2.7e-3, -1.2e-3, -6e-4, -3e-4, -2.1e-4, -1.4e-4, -7e-5, 0.0, 7e-5, 1.4e-4, 2.1e-4, 3e-4, 6e-4, 1.2e-3, 2.7e-3,
+    5.4e-3,
+];
+/// Reflectivities (-) and visibilities (m) in which body shapes are compared under each pitch.
+const PITCH_PAINTS: [f64; 4] = [0.05, 0.1, 0.2, 0.5];
+const PITCH_VISIBILITIES_M: [f64; 3] = [10_000.0, 300.0, 100.0];
 /// Gaps between which the class scores of tracks are taken (m).
 const GAPS_M: [f64; 2] = [20.0, 80.0];
 /// Ranges at which the object-level sensor's own time to confirm a vehicle, and to report a class,
@@ -94,6 +110,7 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
         extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
         range: fitter.ranges(&usual)?,
         shapes: fitter.shapes()?,
+        pitched: fitter.pitched()?,
         validation: None,
     };
     Ok(RearFit { errors: fitter.error_grids(&ranges)?, ..ranges })
@@ -115,9 +132,21 @@ pub fn fit_ranges(plan: &FitPlan<'_>, errors: &RearFit) -> Result<RearFit, Study
         extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
         range: fitter.ranges(&usual_errors)?,
         shapes: fitter.shapes()?,
+        pitched: fitter.pitched()?,
         validation: None,
         ..errors.clone()
     })
+}
+
+/// Fits the ranges under pitches of the ego alone to the full chain. All else is the same as in
+/// another fit. The validation of that fit does not hold for the new one.
+///
+/// # Errors
+/// Works like [`fit`].
+pub fn fit_pitched(plan: &FitPlan<'_>, fit: &RearFit) -> Result<RearFit, StudyError> {
+    let command = format!("{}; {}", fit.origin.command, plan.command);
+    let origin = Origin { command, ..fit.origin.clone() };
+    Ok(RearFit { origin, pitched: Fitter::new(plan)?.pitched()?, validation: None, ..fit.clone() })
 }
 
 /// Fits the errors alone to the full chain, with the ranges of another fit. The validation of that
@@ -172,6 +201,23 @@ fn intermittent(approaches: &[Sightings]) -> [f64; 2] {
     }
     let share = if between_m > 0.0 { (seen_m / between_m).min(1.0) } else { 0.0 };
     [rounded((first_m / lasting_m).max(1.0), 1e3), rounded(share, 1e3)]
+}
+
+/// Centre and spread of a distance over approaches.
+struct Spread {
+    /// Geometric mean (m).
+    centre_m: f64,
+    /// Standard deviation of the logarithm (-).
+    sd: f64,
+}
+
+impl Spread {
+    fn of(approaches: &[Sightings], distance_m: fn(&Sightings) -> f64) -> Self {
+        let logs: Vec<f64> = approaches.iter().map(|sightings| maths::ln(distance_m(sightings))).collect();
+        let centre = mean(&logs);
+        let squares: f64 = logs.iter().map(|log| (log - centre).powi(2)).sum();
+        Self { centre_m: maths::exp(centre), sd: (squares / (logs.len() as f64 - 1.0).max(1.0)).sqrt() }
+    }
 }
 
 impl<'a> Fitter<'a> {
@@ -296,7 +342,7 @@ impl Fitter<'_> {
             let shapes = BodyShape::of_class(class);
             let first_shape = figures(shapes[0])?;
             for shape in shapes {
-                let own = figures(*shape)?;
+                let own = if *shape == shapes[0] { first_shape.clone() } else { figures(*shape)? };
                 let grid = |value: &dyn Fn(&[f64; 4], &[f64; 4]) -> f64| -> Vec<Vec<f64>> {
                     let rows = own.iter().zip(&first_shape);
                     rows.map(|(row, first_row)| {
@@ -321,6 +367,52 @@ impl Fitter<'_> {
             intermittent: intermittent_m,
             intermittent_share,
         })
+    }
+
+    /// Returns the ranges of each body shape under each pitch, relative to the ranges of the first
+    /// shape of its class without pitch.
+    fn pitched(&self) -> Result<Vec<PitchedShapes>, StudyError> {
+        let by = |pitch_rad| self.pitched_by(pitch_rad, &PITCH_PAINTS, &PITCH_VISIBILITIES_M);
+        PITCHES_RAD.into_iter().map(by).collect()
+    }
+
+    /// Returns the ranges of each body shape under a pitch (rad), over paint (-) and visibility (m),
+    /// relative to the ranges of the first shape of its class without pitch.
+    fn pitched_by(&self, pitch_rad: f64, paints: &[f64], visibilities_m: &[f64]) -> Result<PitchedShapes, StudyError> {
+        let [mut range, mut class_range, mut spread] = [const { BTreeMap::new() }; 3];
+        for class in VehicleClass::ALL {
+            let shapes = BodyShape::of_class(class);
+            let grid = |shape: BodyShape, ego_pitch_rad: f64| {
+                let spreads = |paint: f64, visibility_m: f64| {
+                    let case = Self::case(class, paint, Plate::Clean, visibility_m);
+                    let case = Case { shape: Some(shape), ego_pitch_rad, ..case };
+                    let approaches = self.sightings(&case, &self.full)?;
+                    Ok::<_, StudyError>([
+                        Spread::of(&approaches, |sightings| sightings.lasting_m),
+                        Spread::of(&approaches, |sightings| sightings.classified_m),
+                    ])
+                };
+                let row = |paint| visibilities_m.iter().map(|visibility_m| spreads(paint, *visibility_m)).collect();
+                paints.iter().map(|paint| row(*paint)).collect::<Result<Vec<Vec<[Spread; 2]>>, StudyError>>()
+            };
+            let level = grid(shapes[0], 0.0)?;
+            for shape in shapes {
+                let own = grid(*shape, pitch_rad)?;
+                let figures = |figure: &dyn Fn(&[Spread; 2], &[Spread; 2]) -> f64| -> Vec<Vec<f64>> {
+                    let rows = own.iter().zip(&level);
+                    rows.map(|(row, level)| {
+                        row.iter().zip(level).map(|(own, level)| rounded(figure(own, level), 1e3)).collect()
+                    })
+                    .collect()
+                };
+                let name = || shape.name().to_owned();
+                range.insert(name(), figures(&|[own, _], [level, _]| own.centre_m / level.centre_m));
+                class_range.insert(name(), figures(&|[_, own], [_, level]| own.centre_m / level.centre_m));
+                spread.insert(name(), figures(&|[own, _], _| own.sd));
+            }
+        }
+        let extinctions_per_m = extinctions_per_m(visibilities_m);
+        Ok(PitchedShapes { pitch_rad, paints: paints.to_vec(), extinctions_per_m, range, class_range, spread })
     }
 
     /// Returns the mean score of the true class, of each class.

@@ -70,6 +70,24 @@ fn known_errors_and_losses_are_found_again() {
 }
 
 #[test]
+fn an_ego_whose_nose_dips_sees_a_dark_car_from_farther_away() {
+    // A layer of the LiDAR then meets the plate farther away: by 5 m under 0.008°.
+    let file = file(&[]);
+    let plan = FitPlan { file: &file, seed: 0, approaches: 3, command: String::new(), version: String::new() };
+    let fitter = Fitter::new(&plan).unwrap();
+    let [lifted, level, dipped] =
+        [-1.4e-4, 0.0, 1.4e-4].map(|pitch_rad| fitter.pitched_by(pitch_rad, &[0.05], &[10_000.0]).unwrap());
+    assert_eq!([level.range["saloon"][0][0], level.class_range["saloon"][0][0]], [1.0, 1.0]);
+    // Whether a layer meets the lamps of a dark SUV depends on its place in the lane.
+    assert!(level.spread["suv"][0][0] > 0.1 && level.spread["saloon"][0][0] < 0.04, "{:?}", level.spread);
+    for shape in ["saloon", "city-car"] {
+        let ratio = |shapes: &PitchedShapes| shapes.range[shape][0][0] / level.range[shape][0][0];
+        let [lifted, dipped] = [&lifted, &dipped].map(ratio);
+        assert!((0.9..0.98).contains(&lifted) && (1.03..1.1).contains(&dipped), "{shape}: {lifted} {dipped}");
+    }
+}
+
+#[test]
 fn losses_begin_where_scans_are_lost() {
     let step = |gap_m: f64, is_coasting| Step { gap_m, seen: Some(Seen { errors: [0.0; 4], is_coasting }) };
     // From 100 m on. Beyond 60 m every other scan is lost.
