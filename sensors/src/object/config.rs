@@ -153,6 +153,11 @@ impl ObjectSensorModel {
         Self { range_m: fit.usual_m(), class_confidence: fit.class_confidence, fit: Some(fit), ..self }
     }
 
+    /// Returns whether ranges depend on the pitch of the ego.
+    pub(super) fn is_range_pitched(&self) -> bool {
+        self.fit.is_some_and(|fit| !fit.pitched.is_empty())
+    }
+
     /// Returns the errors of a vehicle that the scenario does not give: from the fit, or the errors
     /// of all vehicles.
     pub(super) fn fitted_errors(&self, at: impl FnOnce(&ErrorGrids) -> FittedErrors) -> Option<FittedErrors> {

@@ -267,10 +267,12 @@ impl ObjectSensor {
             let errors = self.ranges.errors(&self.model, other, pitched.at(0.0).range_m);
             let target = &mut self.targets[index];
             target.noise.draw_skipped(&target.errors);
+            target.ranges = pitched.at(pitch_rad);
             (target.pitched, target.errors) = (pitched, errors);
+        } else if self.model.is_range_pitched() {
+            let target = &mut self.targets[index];
+            target.ranges = target.pitched.at(pitch_rad);
         }
-        let target = &mut self.targets[index];
-        target.ranges = target.pitched.at(pitch_rad);
         index
     }
 
